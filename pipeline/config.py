@@ -1,0 +1,213 @@
+"""What can be set, one frozen dataclass per stage.
+
+Every field's docstring gives its symbol where a paper has one, its unit, its default and its source.
+A configuration is checked when it is made and never rewrites itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from motionary.pipeline.canonical import Convention
+
+FeatureKind = Literal["pose+travel", "paper"]
+Metric = Literal["dtw", "b_dtw", "weighted", "fuzzy"]
+LinkageMethod = Literal["complete", "ward", "average", "fuzzy"]
+
+
+@dataclass(frozen=True)
+class ReadConfig:
+    """How files are read where they do not say it themselves; see `motionary.pipeline.readers.read_motion`.
+
+    Parameters
+    ----------
+    position_rule : {"add", "replace"}, optional
+        Whether a BVH's position channels are added to the OFFSET or replace it; found out by default.
+    up : {"y", "z"}
+        The source's vertical axis.
+    unit : float, optional
+        Metres in one source unit.
+    keep_first_frame : bool
+        Keep a rest pose in frame 0 that the motion jumps away from.
+    """
+
+    position_rule: Literal["add", "replace"] | None = None
+    up: Literal["y", "z"] = "y"
+    unit: float | None = None
+    keep_first_frame: bool = False
+
+    def __post_init__(self) -> None:
+        _one_of("position_rule", self.position_rule, (None, "add", "replace"))
+        _one_of("up", self.up, ("y", "z"))
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """From motion to the vectors that are compared [DC 4.1, 4.2].
+
+    Parameters
+    ----------
+    kind : {"pose+travel", "paper"}
+        59 values a frame, or the 54 of the paper's pose at the origin.
+    frame_rate : float
+        Frames a second that every motion is brought to; 30 by default.
+    travel_time : float
+        tau, seconds: weight of the root's velocity against the pose; .10 by our trial.
+    epsilon : float
+        Merging of low-motion frames, in the feature's unit; 0.1 by our trial. 0 merges nothing.
+    criterion : {"sum", "mean"}
+        The text's rule (the sum of inner differences stays under epsilon), or equations 4-5 (their mean).
+    conventions : tuple of Convention
+        A user's own joint-name conventions, tried before the built-in ones.
+    """
+
+    kind: FeatureKind = "pose+travel"
+    frame_rate: float = 30.0
+    travel_time: float = 0.10
+    epsilon: float = 0.1
+    criterion: Literal["sum", "mean"] = "sum"
+    conventions: tuple[Convention, ...] = ()
+
+    def __post_init__(self) -> None:
+        _one_of("kind", self.kind, ("pose+travel", "paper"))
+        _one_of("criterion", self.criterion, ("sum", "mean"))
+        _at_least("frame_rate", self.frame_rate, 1.0)
+        _at_least("travel_time", self.travel_time, 0.0)
+        _at_least("epsilon", self.epsilon, 0.0)
+
+
+@dataclass(frozen=True)
+class DistanceConfig:
+    """The DTW-Curve's thresholds and the size of a tile [DC 4.3, 5].
+
+    Parameters
+    ----------
+    thresholds : {"midpoints", "random"}
+        lambda: the middle of each of the paper's seven intervals, or one drawn in each as the paper does;
+        1 is always the eighth.
+    seed : int
+        Of the draw, under "random".
+    tile : int
+        Clips a side of one task's tile of pairs; the results do not depend on it.
+    """
+
+    thresholds: Literal["midpoints", "random"] = "midpoints"
+    seed: int = 0
+    tile: int = 32
+
+    def __post_init__(self) -> None:
+        _one_of("thresholds", self.thresholds, ("midpoints", "random"))
+        _at_least("tile", self.tile, 1)
+
+
+@dataclass(frozen=True)
+class ClusterConfig:
+    """Linkage, cut and naming [DC 5].
+
+    Parameters
+    ----------
+    primary : {"ward", "complete", "average", "fuzzy"}
+        The linkage whose clusters are published, named and aligned. Default ward; `--paper` takes complete.
+    metric : {"weighted", "dtw", "b_dtw"}
+        The distance it works on; fuzzy linkage has its own.
+    fuzzy_tau : float
+        tau of equation 11, 0 (single linkage) to 1 (complete); .5 as in the paper.
+    cut : {"auto", "strip"}
+        How the number of clusters is found where neither `threshold` nor `n_clusters` is given: labels,
+        else modularity; or the widest threshold strip, the paper's idea.
+    threshold : float, optional
+        mu: merges above it are undone.
+    n_clusters : int, optional
+        kappa: exactly that many clusters.
+    label_column : str
+        The supplied label that clusters are named and scored by.
+    reach : float
+        How many times the furthest labelled member's distance to the reference an unlabelled clip may lie
+        from it and still be named; 1.5 by our trial.
+    """
+
+    primary: LinkageMethod = "ward"
+    metric: Literal["weighted", "dtw", "b_dtw"] = "weighted"
+    fuzzy_tau: float = 0.5
+    cut: Literal["auto", "strip"] = "auto"
+    threshold: float | None = None
+    n_clusters: int | None = None
+    label_column: str = "action"
+    reach: float = 1.5
+
+    def __post_init__(self) -> None:
+        _one_of("primary", self.primary, ("ward", "complete", "average", "fuzzy"))
+        _one_of("metric", self.metric, ("weighted", "dtw", "b_dtw"))
+        _one_of("cut", self.cut, ("auto", "strip"))
+        if not 0 <= self.fuzzy_tau <= 1:
+            raise ValueError(f"fuzzy_tau is {self.fuzzy_tau}; it must lie in 0 .. 1")
+        if self.threshold is not None and self.n_clusters is not None:
+            raise ValueError(
+                f"threshold ({self.threshold}) and n_clusters ({self.n_clusters}) are both given; give one"
+            )
+        if self.n_clusters is not None:
+            _at_least("n_clusters", self.n_clusters, 1)
+        if self.threshold is not None:
+            _at_least("threshold", self.threshold, 0)
+        _at_least("reach", self.reach, 0)
+
+
+@dataclass(frozen=True)
+class AlignmentConfig:
+    """CoTW inside each cluster [CoTW 3].
+
+    Parameters
+    ----------
+    segment_length : int, optional
+        L, frames at 30 a second; by default a quarter of the reference, between 8 and half of it.
+    slack : int, optional
+        delta, frames; by default the largest the method allows, L - 4 [CoTW 4].
+    """
+
+    segment_length: int | None = None
+    slack: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.segment_length is not None:
+            _at_least("segment_length", self.segment_length, 5)
+        if self.slack is not None:
+            _at_least("slack", self.slack, 1)
+        if (
+            self.segment_length is not None
+            and self.slack is not None
+            and self.slack > self.segment_length - 4
+        ):
+            raise ValueError(
+                f"slack is {self.slack} and segment_length {self.segment_length}; "
+                f"slack may be at most segment_length - 4 = {self.segment_length - 4}"
+            )
+
+
+@dataclass(frozen=True)
+class PipelineConfig:
+    """The settings of every stage together."""
+
+    read: ReadConfig = field(default_factory=ReadConfig)
+    features: FeatureConfig = field(default_factory=FeatureConfig)
+    distances: DistanceConfig = field(default_factory=DistanceConfig)
+    clusters: ClusterConfig = field(default_factory=ClusterConfig)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+
+
+def paper_config() -> PipelineConfig:
+    """Return the settings of `--paper`: the paper's pose, complete linkage, the widest threshold strip."""
+    return PipelineConfig(
+        features=FeatureConfig(kind="paper"),
+        clusters=ClusterConfig(primary="complete", cut="strip"),
+    )
+
+
+def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
+    if value not in allowed:
+        raise ValueError(f"{name} is {value!r}; it must be one of {', '.join(map(repr, allowed))}")
+
+
+def _at_least(name: str, value: float, least: float) -> None:
+    if not value >= least:
+        raise ValueError(f"{name} is {value}; it must be at least {least:g}")
