@@ -44,8 +44,8 @@ CANONICAL_PARENTS: tuple[int, ...] = (-1, 0, 1, 2, 3, 2, 5, 6, 2, 8, 9, 0, 11, 1
 """For each canonical joint the one it hangs from, for drawing."""
 
 
-class UnknownSkeletonError(ValueError):
-    """No convention fits a skeleton; `what` says which came nearest, `mend` what to do."""
+class SkeletonError(ValueError):
+    """A skeleton cannot be compared; `what` says why, `mend` what to do."""
 
     def __init__(self, what: str, mend: str) -> None:
         super().__init__(what, mend)
@@ -54,6 +54,10 @@ class UnknownSkeletonError(ValueError):
 
     def __str__(self) -> str:
         return f"{self.what}; {self.mend}"
+
+
+class UnknownSkeletonError(SkeletonError):
+    """No convention fits a skeleton; `what` says which came nearest."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.canonical import CANONICAL_JOINTS, canonical_indices, find_convention
+from motionary.pipeline.canonical import CANONICAL_JOINTS, SkeletonError, canonical_indices, find_convention
 from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.normalise import NormalisedPose, normalise, turn_about_vertical
@@ -78,7 +78,7 @@ def motion_features(motion: Motion, config: FeatureConfig | None = None) -> NDAr
     ------
     UnknownSkeletonError
         No convention fits the skeleton.
-    ValueError
+    SkeletonError
         The figure has no legs to measure it by.
     """
     config = config or FeatureConfig()
@@ -143,8 +143,9 @@ def _leg_length(joints: FloatArray, name: str) -> float:
     bones = [np.linalg.norm(np.diff(joints[:, chain], axis=1), axis=-1).sum(axis=1) for chain in _CHAINS]
     length = float(np.mean([np.median(leg) for leg in bones]))
     if not length > 1e-9:
-        raise ValueError(
-            f"the legs of {name!r} have length {length:g}; thighs and shanks are what it is measured by"
+        raise SkeletonError(
+            f"the legs of {name!r} have length {length:g}, and a figure is measured by its legs",
+            "check the OFFSETs of its thighs and shanks",
         )
     return length
 

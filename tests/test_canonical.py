@@ -44,7 +44,9 @@ def test_namespaces_and_case_do_not_matter(prefix):
 def test_an_unknown_skeleton_is_told_the_nearest_convention():
     bandai = next(one for one in CONVENTIONS if one.name == "bandai")
     names = [name for name in bandai.joints.values() if name != "Toes_L"]
-    with pytest.raises(UnknownSkeletonError, match=r"nearest, 'bandai', misses Toes_L; .* UpperArm_L.*\[conventions"):
+    with pytest.raises(
+        UnknownSkeletonError, match=r"nearest, 'bandai', misses Toes_L; .* UpperArm_L.*\[conventions"
+    ):
         find_convention(names)
 
 

@@ -59,7 +59,8 @@ def test_sampling_at_whole_frames_gives_the_frames():
     same = motion.sampled(np.arange(motion.frames))
     np.testing.assert_allclose(same.positions(), motion.positions(), atol=1e-12)
     np.testing.assert_allclose(
-        motion.sampled([2.25]).root_position[0], 0.75 * motion.root_position[2] + 0.25 * motion.root_position[3]
+        motion.sampled([2.25]).root_position[0],
+        0.75 * motion.root_position[2] + 0.25 * motion.root_position[3],
     )
 
 

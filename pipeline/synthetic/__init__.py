@@ -1,0 +1,33 @@
+"""The embedded library: labelled, seeded motions whose time warps are known.
+
+In reading order: `bodies` (who), `actions` (what; from `gaits`, `single_actions` and their `curves`),
+`styles` (how), `posture` (channels to a posed body), `conventions` (a posed body to a skeleton), `library`
+(takes and warps), `files` (a folder of them). Nothing is read from disk.
+"""
+
+from motionary.pipeline.synthetic.actions import ACTIONS
+from motionary.pipeline.synthetic.bodies import BODIES, DEFAULT_BODY
+from motionary.pipeline.synthetic.conventions import CONVENTIONS
+from motionary.pipeline.synthetic.files import write_library
+from motionary.pipeline.synthetic.library import (
+    TEMPLATE_FPS,
+    SyntheticTake,
+    synthetic_library,
+    template,
+    template_frames,
+)
+from motionary.pipeline.synthetic.styles import STYLES
+
+__all__ = [
+    "ACTIONS",
+    "BODIES",
+    "CONVENTIONS",
+    "DEFAULT_BODY",
+    "STYLES",
+    "TEMPLATE_FPS",
+    "SyntheticTake",
+    "synthetic_library",
+    "template",
+    "template_frames",
+    "write_library",
+]
