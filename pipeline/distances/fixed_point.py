@@ -1,0 +1,74 @@
+"""Exact totals: costs as integers, each packed with a count of one into a single 64-bit word.
+
+A warping path is judged by (total cost, number of cells), in that order. Floating-point totals depend on the
+order of addition, so that equal ones may come out different; here a cost c becomes the integer
+
+    q = round(c / quantum),    quantum = a power of two, about max(D) / 2^value_bits
+    word = q * 2^length_bits + 1
+
+Sums of words are exact, compare as (total, length), and mean the same in whatever order they are formed.
+`length_bits` holds the longest path, m + n - 1 cells; `value_bits` = min(52, 62 - 2 length_bits), so that no
+total exceeds 62 bits: 48 bits of cost for clips of 60 frames, 30 for clips of 20,000. A distance is
+therefore within max(D) / 2^value_bits of the one in real numbers, whatever the unit of the costs.
+
+The rival is one quantum for all matrices: it overflows on costs in millimetres or loses those in kilometres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+# Above every word and every total; the sum of two is still a 64-bit integer.
+UNREACHED = 1 << 62
+# A 64-bit float holds integers, and integers and a half, exactly below this power of two.
+MOST_VALUE_BITS = 52
+# Longest path for which a cost keeps 24 bits, the precision of the float32 it was computed in.
+MOST_LENGTH_BITS = 19
+
+
+def refuse_too_long(rows: int, columns: int) -> None:
+    """Raise ValueError where a path through (rows, columns) could have more cells than can be summed."""
+    if rows + columns - 1 >= 1 << MOST_LENGTH_BITS:
+        raise ValueError(
+            f"{rows} and {columns} frames: up to {rows + columns - 1} cells on a path, and at most "
+            f"{(1 << MOST_LENGTH_BITS) - 1} can be summed exactly; resample or cut the clips"
+        )
+
+
+@njit(cache=True, nogil=True)
+def length_bits_of(frames_a, frames_b):  # type: ignore[no-untyped-def]
+    """Bits that hold the number of cells of the longest path, m + n - 1."""
+    bits = 1
+    while (frames_a + frames_b - 1) >> bits:
+        bits += 1
+    return bits
+
+
+@njit(cache=True, nogil=True)
+def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
+    """Power of two that brings the largest cost just under 2^value_bits."""
+    if largest == 0:
+        return 1.0
+    value_bits = min(MOST_VALUE_BITS, 62 - 2 * length_bits)
+    # Below 2^-960 the reciprocal would overflow; costs that small are rounded more coarsely.
+    return math.ldexp(1.0, max(math.frexp(largest)[1] - value_bits, -960))
+
+
+@njit(cache=True, nogil=True)
+def pack(costs, quantum, length_bits, words):  # type: ignore[no-untyped-def]
+    """Fill `words` (m, n) int64 from `costs` (m, n) float64."""
+    per_quantum = 1.0 / quantum
+    for i in range(words.shape[0]):
+        cost_row, word_row = costs[i], words[i]
+        for j in range(words.shape[1]):
+            word_row[j] = (np.int64(np.rint(cost_row[j] * per_quantum)) << length_bits) + 1
+
+
+@njit(cache=True, nogil=True)
+def mean_quanta(total, length_bits):  # type: ignore[no-untyped-def]
+    """Total cost over number of cells of a path's word, in quanta, rounded to the nearest, halves up."""
+    length = total & ((1 << length_bits) - 1)
+    return ((total >> length_bits) + (length >> 1)) // length
