@@ -28,9 +28,9 @@ from dataclasses import dataclass
 from operator import index
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from motionary.pipeline.alignment.cotw_kernels import best_step, segment_table
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import Warp, checked_sequence, interpolate
 from motionary.pipeline.alignment.weights import checked_weights
@@ -172,7 +172,7 @@ def correlation_tables(
     target = np.ascontiguousarray((reference - reference.mean(axis=0, dtype=np.float64)).T)
     radii = _node_radii(len(nodes) - 1, slack)
     return [
-        _segment_table(
+        segment_table(
             source[:, nodes[k] : nodes[k + 1] + 1], target, weights, moving_floor, reference_floor,
             slack, nodes[k], radii[k], radii[k + 1],
         )
@@ -202,7 +202,7 @@ def best_stretches(tables: list[FloatArray], slack: int, tie: float) -> tuple[fl
     best: FloatArray = np.zeros(1)
     choices = []
     for k in reversed(range(segments)):
-        best, choice = _best_step(tables[k], best, slack, radii[k], radii[k + 1], tie)
+        best, choice = best_step(tables[k], best, slack, radii[k], radii[k + 1], tie)
         choices.append(choice)
     eta = np.zeros(segments, dtype=np.int64)
     moved = 0
@@ -256,111 +256,3 @@ def _checked_parameters(segment_length: int, slack: int, frames: int) -> tuple[i
 
 def _node_radii(segments: int, slack: int) -> list[int]:
     return [slack * min(k, segments - k) for k in range(segments + 1)]
-
-
-@njit(cache=True, nogil=True)
-def _segment_table(  # noqa: PLR0917
-    segment: FloatArray,
-    reference: FloatArray,
-    weights: FloatArray,
-    segment_floor: FloatArray,
-    reference_floor: FloatArray,
-    slack: int,
-    start: int,
-    radius: int,
-    next_radius: int,
-) -> FloatArray:
-    dofs, nodes = segment.shape
-    length = nodes - 1
-    table = np.zeros((2 * slack + 1, 2 * radius + 1))
-    powers = np.zeros((2 * slack + 1, 2 * radius + 1))
-    products = np.empty(2 * radius + 1)
-    stretched = np.empty(length + slack + 1)
-    for dof in range(dofs):
-        if weights[dof] == 0.0:
-            continue
-        signal = reference[dof, start - radius :]
-        _window_powers(signal, length - slack, powers)
-        for row in range(2 * slack + 1):
-            eta = row - slack
-            first = max(0, radius - next_radius - eta)
-            last = min(2 * radius, radius + next_radius - eta)
-            frames = length + eta + 1
-            if first > last:
-                continue
-            power = _stretch(segment[dof], stretched[:frames])
-            if power <= segment_floor[dof] * frames:
-                continue
-            _slide(stretched[:frames], signal[first:], products[: last - first + 1])
-            for place in range(first, last + 1):
-                if powers[row, place] > reference_floor[dof] * frames:
-                    rho = products[place - first] / np.sqrt(power * powers[row, place])
-                    table[row, place] += weights[dof] * rho
-    return table
-
-
-@njit(cache=True, nogil=True)
-def _stretch(segment: FloatArray, stretched: FloatArray) -> float:
-    """Interpolate a segment to more or fewer frames, centre it, and return its sum of squares."""
-    length, span = len(segment) - 1, len(stretched) - 1
-    total = 0.0
-    for j in range(span + 1):
-        before, rest = divmod(j * length, max(span, 1))
-        value = segment[before]
-        if rest:
-            value += (rest / span) * (segment[before + 1] - value)
-        stretched[j] = value
-        total += value
-    mean = total / (span + 1)
-    power = 0.0
-    for j in range(span + 1):
-        stretched[j] -= mean
-        power += stretched[j] * stretched[j]
-    return power
-
-
-@njit(cache=True, nogil=True)
-def _window_powers(signal: FloatArray, least: int, powers: FloatArray) -> None:
-    """Fill powers[q, s] with the centred sum of squares of signal[s .. s + least + q] (Welford)."""
-    rows, places = powers.shape
-    mean = signal[:places].copy()
-    squares = np.zeros(places)
-    for j in range(1, min(least + rows, len(signal))):
-        within = min(places, len(signal) - j)
-        for s in range(within):
-            delta = signal[s + j] - mean[s]
-            mean[s] += delta / (j + 1)
-            squares[s] += delta * (signal[s + j] - mean[s])
-        if j >= least:
-            powers[j - least, :within] = squares[:within]
-
-
-@njit(cache=True, nogil=True)
-def _slide(pattern: FloatArray, signal: FloatArray, products: FloatArray) -> None:
-    """Fill products[s] with the inner product of the pattern and signal[s ..], in one order for every s."""
-    products[:] = 0.0
-    for j in range(len(pattern)):
-        for s in range(len(products)):
-            products[s] += pattern[j] * signal[s + j]
-
-
-@njit(cache=True, nogil=True)
-def _best_step(  # noqa: PLR0917
-    table: FloatArray, following: FloatArray, slack: int, radius: int, next_radius: int, tie: float
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Take one step of the recurrence back: F_k from F_(k+1), and the eta of each place."""
-    table_slack, table_radius = (table.shape[0] - 1) // 2, (table.shape[1] - 1) // 2
-    best = np.full(2 * radius + 1, -np.inf)
-    choice = np.zeros(2 * radius + 1, dtype=np.int64)
-    for place in range(-radius, radius + 1):
-        for turn in range(2 * slack + 1):
-            # 0, -1, 1, -2, 2, ...: the first of equals is the least stretch
-            eta = -(turn + 1) // 2 if turn % 2 else turn // 2
-            end = place + eta
-            if abs(end) > next_radius:
-                continue
-            value = table[eta + table_slack, place + table_radius] + following[end + next_radius]
-            if best[place + radius] == -np.inf or value > best[place + radius] + tie:
-                best[place + radius] = value
-                choice[place + radius] = eta
-    return best, choice
