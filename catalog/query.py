@@ -1,0 +1,210 @@
+"""A catalog as people use it: tables, SQL, motions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from fsspec.implementations.local import LocalFileSystem
+
+from motionary.catalog.schema import SCHEMAS
+from motionary.catalog.snapshot import Snapshot, current_snapshot
+from motionary.catalog.store import Store
+from motionary.pipeline.motion import Motion
+from motionary.pipeline.stages.motions import read_motion_rows
+
+if TYPE_CHECKING:
+    import duckdb
+    import pandas as pd
+
+
+class CatalogError(Exception):
+    """A catalog cannot answer; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class CatalogTable:
+    """One table of an opened catalog, read when asked for."""
+
+    name: str
+    store: Store
+    files: Sequence[str]
+
+    def to_arrow(self) -> pa.Table:
+        """Read the table with its units in the field metadata."""
+        return self.store.read(self.files)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Read the table as a data frame."""
+        return self.to_arrow().to_pandas()
+
+    def __len__(self) -> int:
+        filesystem = self.store.filesystem
+        return sum(pq.read_metadata(self.store.path(f), filesystem=filesystem).num_rows for f in self.files)
+
+    def __repr__(self) -> str:
+        return f"<{self.name}: {len(self)} rows, {', '.join(SCHEMAS[self.name].names)}>"
+
+
+class _Table:
+    """Attribute of a catalog that gives the table of the same name."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, catalog: Catalog | None, owner: type) -> CatalogTable:
+        if catalog is None:
+            raise AttributeError(
+                f"{self.name} is a table of an opened catalog: Catalog.open(url).{self.name}"
+            )
+        return CatalogTable(self.name, catalog.store, catalog.snapshot.tables[self.name])
+
+
+class Catalog:
+    """A published catalog, opened for reading.
+
+    It keeps the snapshot it was opened at: a run that publishes meanwhile changes nothing it shows.
+
+    Examples
+    --------
+    >>> from motionary.catalog import Catalog
+    >>> catalog = Catalog.open("takes.catalog")                                    # doctest: +SKIP
+    >>> catalog.sql("select label, count(*) from clusters group by label")         # doctest: +SKIP
+    """
+
+    clips = _Table()
+    frames = _Table()
+    features = _Table()
+    resampled = _Table()
+    pairs = _Table()
+    linkage = _Table()
+    partitions = _Table()
+    cuts = _Table()
+    clusters = _Table()
+    references = _Table()
+    alignments = _Table()
+    aligned_frames = property(
+        lambda self: CatalogTable("aligned", self.store, self.snapshot.tables["aligned"])
+    )
+    quarantine = _Table()
+    runs = _Table()
+
+    def __init__(self, store: Store, snapshot: Snapshot) -> None:
+        self.store = store
+        self.snapshot = snapshot
+
+    @classmethod
+    def open(cls, url: str) -> Catalog:
+        """Open the published snapshot of a catalog.
+
+        Parameters
+        ----------
+        url : str
+            A folder, or any fsspec URL.
+
+        Raises
+        ------
+        CatalogError
+            Nothing is published there.
+        """
+        store = Store(str(url))
+        snapshot = current_snapshot(store)
+        if snapshot is None:
+            raise CatalogError(f"{url} is not a catalog; make one with: motionary run LIBRARY {url}")
+        return cls(store, snapshot)
+
+    def __repr__(self) -> str:
+        return f"<Catalog {self.store.url}: {len(self.clips)} clips, snapshot {self.snapshot.snapshot_id}>"
+
+    def sql(self, query: str, parameters: Sequence[object] | Mapping[str, object] | None = None) -> pa.Table:
+        """Ask a question in DuckDB's SQL; every table of the catalog is a view of its name.
+
+        Parameters
+        ----------
+        query : str
+            One statement; `?` or `$name` stand for parameters.
+        parameters : sequence or mapping, optional
+            Values of the parameters.
+
+        Raises
+        ------
+        CatalogError
+            The query is not valid; the message is DuckDB's.
+        """
+        import duckdb
+
+        with duckdb.connect() as connection:
+            self._create_views(connection)
+            try:
+                answer = connection.sql(query, params=parameters)
+                if answer is None:
+                    raise CatalogError("the query answers with no rows; a catalog is only read: select ...")
+                return answer.to_arrow_table()
+            except duckdb.Error as error:
+                raise CatalogError(f"the query cannot be answered: {error}") from error
+
+    def motion(self, clip_id: str) -> Motion:
+        """Read a clip's motion as it was captured.
+
+        Raises
+        ------
+        CatalogError
+            The catalog has no such clip.
+        """
+        clip = self._clip(clip_id)
+        return self._motion(clip, "frames", clip["fps"])
+
+    def aligned(self, clip_id: str) -> Motion:
+        """Read a clip's motion aligned in time to its cluster's reference.
+
+        Raises
+        ------
+        CatalogError
+            The catalog has no such clip.
+        """
+        alignments = self.alignments.to_arrow()
+        clip = self._clip(clip_id)
+        row = alignments.filter(pc.equal(alignments["clip_id"], clip_id))
+        return self._motion(clip, "aligned", row["frame_rate"][0].as_py())
+
+    def _create_views(self, connection: duckdb.DuckDBPyConnection) -> None:
+        filesystem = self.store.filesystem
+        if not isinstance(filesystem, LocalFileSystem):
+            connection.register_filesystem(filesystem)
+        for name, files in self.snapshot.tables.items():
+            listed = ", ".join(_sql_text(self.store.full_path(file)) for file in files)
+            connection.execute(f'create view "{name}" as from read_parquet([{listed}], union_by_name = true)')
+
+    def _clip(self, clip_id: str) -> dict:
+        table = self.clips.to_arrow()
+        rows = table.filter(pc.equal(table["clip_id"], clip_id)).to_pylist()
+        if not rows:
+            raise CatalogError(
+                f"no clip {clip_id!r} in {self.store.url}{_nearest(clip_id, table['clip_id'].to_pylist())}"
+            )
+        return rows[0]
+
+    def _motion(self, clip: dict, table: str, fps: float) -> Motion:
+        filesystem = self.store.filesystem
+        rows = pa.concat_tables(
+            pq.read_table(
+                self.store.path(file), filesystem=filesystem, filters=[("clip_id", "=", clip["clip_id"])]
+            )
+            for file in self.snapshot.tables[table]
+        )
+        return read_motion_rows(clip, rows, fps)
+
+
+def _nearest(name: str, known: Sequence[str]) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, known, n=3, cutoff=0.5)
+    return f"; did you mean {', '.join(close)}?" if close else ""
+
+
+def _sql_text(text: str) -> str:
+    return "'" + text.replace("'", "''") + "'"

@@ -1,0 +1,95 @@
+"""Snapshots: which parts make up the catalog at one moment.
+
+A snapshot is a manifest, `snapshots/<id>.json`, that lists the files of every table. `CURRENT` holds the id
+of the published one. Publishing writes the manifest and then replaces `CURRENT` in one step, so that a
+reader sees the old catalog or the new one, and an interrupted run leaves the old.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+from motionary.catalog.schema import PUBLISHED, VERSION
+from motionary.catalog.store import Store
+
+CURRENT = "CURRENT"
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A published state of a catalog.
+
+    Parameters
+    ----------
+    snapshot_id : str
+        Six digits, rising.
+    created_at : str
+        ISO time, UTC.
+    tables : mapping of str to list of str
+        The files of each table, relative to the catalog, in order.
+    schema_version : int
+        Of the tables.
+    """
+
+    snapshot_id: str
+    created_at: str
+    tables: Mapping[str, Sequence[str]]
+    schema_version: int = VERSION
+
+
+def current_snapshot(store: Store) -> Snapshot | None:
+    """Read the published snapshot, None where nothing has been published.
+
+    Raises
+    ------
+    ValueError
+        The catalog was written by a later version of motionary.
+    """
+    try:
+        snapshot_id = store.read_bytes(CURRENT).decode().strip()
+    except FileNotFoundError:
+        return None
+    manifest = json.loads(store.read_bytes(_manifest_name(snapshot_id)))
+    if manifest["schema_version"] > VERSION:
+        raise ValueError(
+            f"catalog {store.url} has schema version {manifest['schema_version']}, "
+            f"this motionary reads up to {VERSION}; install a newer motionary"
+        )
+    return Snapshot(**manifest)
+
+
+def next_snapshot_id(store: Store) -> str:
+    """Return the id that the next snapshot will have."""
+    published = current_snapshot(store)
+    return f"{int(published.snapshot_id) + 1 if published else 1:06d}"
+
+
+def publish(store: Store, snapshot: Snapshot) -> None:
+    """Make a snapshot the one that readers open.
+
+    Raises
+    ------
+    ValueError
+        A table is missing from the snapshot, or names a file that is not there.
+    """
+    missing = [table for table in PUBLISHED if not snapshot.tables.get(table)]
+    if missing:
+        raise ValueError(f"snapshot {snapshot.snapshot_id} lacks the tables {', '.join(missing)}")
+    absent = [file for files in snapshot.tables.values() for file in files if not _exists(store, file)]
+    if absent:
+        raise ValueError(
+            f"snapshot {snapshot.snapshot_id} names files that are not there: {', '.join(absent)}"
+        )
+    manifest = json.dumps(asdict(snapshot), indent=1, sort_keys=True)
+    store.write(_manifest_name(snapshot.snapshot_id), manifest.encode())
+    store.write(CURRENT, snapshot.snapshot_id.encode())
+
+
+def _manifest_name(snapshot_id: str) -> str:
+    return f"snapshots/{snapshot_id}.json"
+
+
+def _exists(store: Store, file: str) -> bool:
+    return bool(store.filesystem.exists(store.path(file)))

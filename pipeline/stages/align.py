@@ -1,0 +1,106 @@
+"""Clusters and their references -> every clip aligned in time to its cluster's reference [CoTW 3]."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from motionary.pipeline.alignment import CotwWarp, cotw, default_parameters, mean_correlation, uniform
+from motionary.pipeline.config import AlignmentConfig
+from motionary.pipeline.motion import FloatArray, Motion
+from motionary.pipeline.stages.columns import POSE_COLUMNS, matrix, per_clip
+from motionary.pipeline.stages.motions import motion_rows, read_motions
+from motionary.pipeline.tables import TABLES
+
+VERSION = 1
+MAKES = ("alignments", "aligned")
+
+
+def align(
+    ingested: pa.Table,
+    frames: pa.Table,
+    features: pa.Table,
+    clusters: pa.Table,
+    reference_features: pa.Table,
+    config: AlignmentConfig,
+    frame_rate: float,
+) -> dict[str, pa.Table]:
+    """Align the clips of a batch, each to the reference of its cluster.
+
+    Parameters
+    ----------
+    ingested, frames, features : pyarrow.Table
+        The batch.
+    clusters, reference_features : pyarrow.Table
+        Of the whole library.
+    config : AlignmentConfig
+        Segment length and slack.
+    frame_rate : float
+        Frames a second of the features.
+
+    Returns
+    -------
+    dict of str to pyarrow.Table
+        `alignments` and `aligned`.
+    """
+    cluster_of = dict(zip(clusters["clip_id"].to_pylist(), clusters["cluster_id"].to_pylist(), strict=True))
+    references = {
+        rows["cluster_id"][0].as_py(): (clip_id, _pose(rows))
+        for clip_id, rows in per_clip(reference_features).items()
+    }
+    sequences = per_clip(features)
+    alignments, aligned = [TABLES["alignments"].empty_table()], [TABLES["aligned"].empty_table()]
+    for clip_id, motion in read_motions(ingested, frames):
+        cluster_id = cluster_of[clip_id]
+        reference_id, reference = references[cluster_id]
+        moving = _pose(sequences[clip_id])
+        warp = _warp(moving, reference, config)
+        alignments.append(
+            _alignment_row(clip_id, cluster_id, reference_id, moving, reference, warp, frame_rate)
+        )
+        aligned.append(_aligned_rows(clip_id, motion, warp, frame_rate))
+    return {"alignments": pa.concat_tables(alignments), "aligned": pa.concat_tables(aligned)}
+
+
+def _pose(rows: pa.Table) -> FloatArray:
+    return matrix(rows["feature"])[:, :POSE_COLUMNS]
+
+
+def _warp(moving: FloatArray, reference: FloatArray, config: AlignmentConfig) -> CotwWarp:
+    length, slack = default_parameters(len(reference))
+    if config.segment_length is not None:
+        length = min(config.segment_length, len(reference))
+        slack = length - 4
+    if config.slack is not None:
+        slack = min(config.slack, length - 4)
+    return cotw(moving, reference, length, max(slack, 0))
+
+
+def _alignment_row(
+    clip_id: str,
+    cluster_id: int,
+    reference_id: str,
+    moving: FloatArray,
+    reference: FloatArray,
+    warp: CotwWarp,
+    frame_rate: float,
+) -> pa.Table:
+    row = {
+        "clip_id": clip_id,
+        "cluster_id": cluster_id,
+        "reference_id": reference_id,
+        "frame_rate": frame_rate,
+        "segment_length": warp.segment_length,
+        "slack": warp.slack,
+        "objective": warp.objective,
+        "correlation_before": mean_correlation(uniform(moving, reference).apply(moving), reference),
+        "correlation": mean_correlation(warp.apply(moving), reference),
+        "eta": np.asarray(warp.eta).tolist(),
+        "source_time": warp.source_time.tolist(),
+    }
+    return pa.Table.from_pylist([row], schema=TABLES["alignments"])
+
+
+def _aligned_rows(clip_id: str, motion: Motion, warp: CotwWarp, frame_rate: float) -> pa.Table:
+    rows = motion_rows(clip_id, warp.apply_motion(motion, rate=frame_rate))
+    return rows.cast(TABLES["aligned"])
