@@ -1,0 +1,57 @@
+# Every target makes what it needs. A machine needs Python 3.11 to 3.13, make and git.
+
+FITS := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+PYTHON ?= $(shell for one in python3 python3.13 python3.12 python3.11; do \
+	$$one -c '$(FITS)' 2>/dev/null && echo $$one && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed')
+
+.PHONY: help demo test test-all lint clean
+
+help:
+	@echo "make demo      run the main job on the embedded library and show the result"
+	@echo "make test      run the tests, without those marked slow"
+	@echo "make test-all  run all tests"
+	@echo "make lint      check style, types and the direction of imports"
+	@echo "make clean     remove the environment and what the targets made"
+
+demo: $(VENV)/installed
+	@echo "== The main job on the embedded library of made-up motions, in motionary-demo/"
+	$(BIN)/motionary demo motionary-demo
+
+test: $(VENV)/installed
+	@echo "== The tests, without those marked slow"
+	$(BIN)/python -m pytest -m "not slow"
+
+test-all: $(VENV)/installed
+	@echo "== All tests"
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/installed
+	@echo "== Style, types, direction of imports"
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy -p motionary.pipeline -p motionary.catalog -p motionary.workflows
+	$(BIN)/lint-imports
+
+clean:
+	rm -rf $(VENV) build motionary-demo .hypothesis .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	find . -name '*.egg-info' -o -name __pycache__ | xargs rm -rf
+
+$(VENV)/environment: constraints.txt pyproject.toml
+	@test -n "$(PYTHON)" || { echo "motionary needs Python 3.11 to 3.13; name one: make PYTHON=python3.12" >&2; exit 1; }
+	@echo "== Making the environment $(VENV) with $$($(PYTHON) --version)"
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt pip setuptools wheel
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt ".[test,lint]"
+	@touch $@
+
+# Installed as users have it, not in editable mode: a forgotten subpackage shows. The old installation goes
+# first, since the kernels that numba keeps beside it would outlive a change in a module that they call.
+$(VENV)/installed: $(VENV)/environment $(SOURCES)
+	@echo "== Installing motionary into $(VENV)"
+	@rm -rf build $(VENV)/lib/python*/site-packages/motionary
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
+	@rm -rf build
+	@touch $@

@@ -1,0 +1,184 @@
+"""The command line: what it prints, where, and with which exit code."""
+
+import csv
+import io
+import json
+import subprocess
+import sys
+
+import pyarrow.parquet as pq
+import pytest
+
+from motionary.workflows import cli
+
+
+@pytest.fixture
+def motionary(monkeypatch, capfdbinary):
+    """Run a command in this process; returns exit code, stdout and stderr."""
+
+    def call(*arguments: object, binary: bool = False):
+        monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        out, err = capfdbinary.readouterr()
+        return stop.value.code, out if binary else out.decode(), err.decode()
+
+    return call
+
+
+def test_help_answers_without_the_numerical_stack():
+    script = (
+        "import sys; sys.argv = ['motionary', '--help']\n"
+        "from motionary.workflows.cli import main\n"
+        "try: main()\n"
+        "finally: print(sorted({'numpy', 'scipy', 'pyarrow', 'numba', 'dask'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "Cluster, name and align" in done.stdout
+    assert done.stdout.strip().endswith("[]")
+
+
+@pytest.mark.parametrize("command", ["run", "demo", "status", "query", "graph"])
+def test_every_command_has_help(motionary, command):
+    code, out, _ = motionary(command, "--help")
+    assert code == 0
+    assert "Usage: motionary" in out
+
+
+def test_run_prints_what_it_found(motionary, demo_library, demo_catalog):
+    code, out, err = motionary(
+        "run", demo_library, demo_catalog, "--labels", demo_library / "labels.csv", "--workers", 1
+    )
+    assert code == 0
+    for words in (
+        "clips, 0 quarantined",
+        "reference",
+        "reward-punish",
+        "ARI",
+        "widest strip",
+        "b_dtw",
+        "fuzzy",
+        "Time:",
+    ):
+        assert words in out
+    assert demo_catalog in out
+    assert "ingest: " in err
+    assert "results were there already" in err
+    assert "ingest: " not in out
+
+
+def test_a_run_with_quarantined_clips_exits_3(motionary, demo_library, tmp_path):
+    library = tmp_path / "library"
+    library.mkdir()
+    (library / "bad.bvh").write_text("HIERARCHY\n")
+    good = next(demo_library.rglob("squat*.bvh"))
+    (library / "good.bvh").write_bytes(good.read_bytes())
+    code, out, _ = motionary("run", library, tmp_path / "out", "--workers", 1)
+    assert code == 3
+    assert "1 clips, 1 quarantined" in out
+    assert "bad.bvh" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (("run", "nowhere", "out"), 1, "nowhere"),
+        (("run", "{library}", "{out}", "--labels", "none.csv"), 1, "no labels file none.csv"),
+        (("run", "{library}", "{out}", "--config", "none.toml"), 1, "no configuration file none.toml"),
+        (("run", "{library}", "{out}", "--clusters", "2", "--threshold", "1"), 1, "give one"),
+        (
+            ("run", "{library}", "{out}", "--labels", "{labels}", "--label-column", "mood"),
+            1,
+            "no column 'mood'",
+        ),
+        (
+            ("run", "{library}", "{out}", "--scheduler", "tcp://127.0.0.1:9", "--workers", "1"),
+            1,
+            "no Dask scheduler",
+        ),
+        (("status", "nowhere"), 1, "nowhere is not a catalog"),
+        (("status", "{catalog}", "--clip", "gone.bvh"), 1, "no clip 'gone.bvh'"),
+        (("query", "{catalog}", "select oops"), 1, "oops"),
+        (("graph", "graph.png"), 1, "written as .svg or .txt"),
+        (("run", "{library}", "{out}", "--primary", "single"), 2, "--primary"),
+        (("run", "{library}"), 2, "CATALOG"),
+        (("query", "{catalog}", "select 1", "--format", "xml"), 2, "--format"),
+        (("dance",), 2, "dance"),
+    ],
+)
+def test_a_mistake_is_one_clear_line(
+    motionary, demo_library, demo_catalog, tmp_path, arguments, code, message
+):
+    places = {"library": demo_library, "catalog": demo_catalog, "out": tmp_path / "out"}
+    places["labels"] = demo_library / "labels.csv"
+    got, out, err = motionary(*(argument.format(**places) for argument in arguments))
+    assert got == code
+    assert message in err
+    assert "Traceback" not in err
+    assert out == ""
+    if code == 1:
+        assert err.startswith("motionary: ")
+
+
+def test_query_formats(motionary, demo_catalog):
+    sql = "select label, count(*) as clips from clusters group by label order by label"
+    _, table, _ = motionary("query", demo_catalog, sql)
+    _, as_json, _ = motionary("query", demo_catalog, sql, "--format", "json")
+    _, as_csv, _ = motionary("query", demo_catalog, sql, "--format", "csv")
+    _, as_parquet, _ = motionary("query", demo_catalog, sql, "--format", "parquet", binary=True)
+    rows = json.loads(as_json)
+    assert [row["label"] for row in rows] == [
+        "jump",
+        "kick",
+        "punch",
+        "run",
+        "squat",
+        "throw",
+        "walk",
+        "wave",
+    ]
+    assert [row["label"] for row in csv.DictReader(io.StringIO(as_csv))] == [row["label"] for row in rows]
+    assert pq.read_table(io.BytesIO(as_parquet)).to_pylist() == rows
+    assert all(row["label"] in table for row in rows)
+
+
+def test_nested_values_survive_csv(motionary, demo_catalog):
+    _, out, _ = motionary("query", demo_catalog, "select eta from alignments limit 1", "--format", "csv")
+    assert isinstance(json.loads(next(csv.DictReader(io.StringIO(out)))["eta"]), list)
+
+
+def test_a_long_value_is_not_cut_where_nobody_looks(motionary, demo_catalog):
+    _, out, _ = motionary("query", demo_catalog, "select repeat('x', 150) || 'end' as long")
+    assert "xend" in out.replace("\n", "")
+
+
+def test_status_of_a_catalog_and_of_a_clip(motionary, demo_catalog):
+    code, out, _ = motionary("status", demo_catalog)
+    assert code == 0
+    assert "Clusters" in out
+    code, out, _ = motionary("status", demo_catalog, "--clip", "walk/walk_neutral_alex_01.bvh")
+    assert code == 0
+    assert "walk" in out
+    assert "reference" in out
+
+
+def test_graph_as_text_and_picture(motionary, tmp_path, demo_library):
+    code, _, _ = motionary("graph", tmp_path / "graph.txt")
+    assert code == 0
+    lines = (tmp_path / "graph.txt").read_text().splitlines()
+    assert lines[0] == "ingest 1"
+    assert "compare 2 <- ingest 1, ingest 2" in lines
+    assert next(line for line in lines if line.startswith("represent 1 <- ")).endswith(
+        "compare 6, ingest 1, ingest 2, ingest 3"
+    )
+    motionary("graph", tmp_path / "graph.svg", "--library", demo_library)
+    picture = (tmp_path / "graph.svg").read_text()
+    assert picture.startswith("<svg")
+    assert "ingest: 3 tasks" in picture
+
+
+def test_names_with_brackets_and_columns_of_one_name_are_shown(motionary, demo_catalog):
+    _, out, _ = motionary("query", demo_catalog, "select '[bold]x' as a, 'second' as b, 'third' as b")
+    assert "[bold]x" in out
+    assert "second" in out
+    assert "third" in out

@@ -1,0 +1,242 @@
+"""The command line. Every command is a few lines: it reads its options, calls, and prints.
+
+What computes is imported inside the commands, so that `--help` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from motionary.pipeline.config import PipelineConfig
+    from motionary.workflows.main_job import RunResult
+
+FAILED, QUARANTINED = 1, 3
+
+app = typer.Typer(
+    name="motionary",
+    help="A dictionary of motion: cluster, name and align a library of motion capture.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips.",
+)
+
+CatalogUrl = Annotated[
+    str, typer.Argument(metavar="CATALOG", help="Folder of the catalog, or its fsspec URL.")
+]
+OutputFormat = Annotated[
+    Literal["table", "json", "csv", "parquet"], typer.Option("--format", help="How to write the answer.")
+]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes on this machine.", show_default="one a core")
+]
+Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
+
+
+@app.command()
+def run(
+    library: Annotated[Path, typer.Argument(metavar="LIBRARY", help="Folder of motion capture.")],
+    catalog: CatalogUrl,
+    also: Annotated[
+        list[Path] | None, typer.Option("--also", help="A further library; repeat for more.")
+    ] = None,
+    labels: Annotated[
+        Path | None, typer.Option("--labels", help="CSV of labels: path or clip_id, and any label columns.")
+    ] = None,
+    label_column: Annotated[
+        str | None,
+        typer.Option("--label-column", help="Column that clusters are named by.", show_default="action"),
+    ] = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="The paper's settings: its pose, complete linkage, widest strip.")
+    ] = False,
+    primary: Annotated[
+        Literal["ward", "complete", "average", "fuzzy"] | None,
+        typer.Option("--primary", help="Linkage whose clusters are published.", show_default="ward"),
+    ] = None,
+    metric: Annotated[
+        Literal["weighted", "dtw", "b_dtw"] | None,
+        typer.Option("--metric", help="Distance that linkage works on.", show_default="weighted"),
+    ] = None,
+    clusters: Annotated[
+        int | None, typer.Option("--clusters", "--kappa", min=1, help="Exactly this many clusters.")
+    ] = None,
+    threshold: Annotated[
+        float | None, typer.Option("--threshold", "--mu", min=0, help="Cut the dendrogram at this height.")
+    ] = None,
+    travel: Annotated[
+        bool,
+        typer.Option("--travel/--no-travel", help="Whether the direction of travel tells motions apart."),
+    ] = True,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings of every stage, TOML.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Cluster, name and align the motions of LIBRARY into CATALOG."""
+    options: dict[str, dict[str, Any]] = {"clusters": {}, "features": {}}
+    if paper:
+        from motionary.workflows.settings import PAPER
+
+        options = {stage: dict(fields) for stage, fields in PAPER.items()}
+    given = {
+        "primary": primary, "metric": metric, "n_clusters": clusters, "threshold": threshold,
+        "label_column": label_column,
+    }  # fmt: skip
+    options["clusters"] |= {name: value for name, value in given.items() if value is not None}
+    if not travel:
+        options["features"]["travel_time"] = 0.0
+    _run([library, *(also or [])], catalog, _settings(config, options), labels, workers, scheduler)
+
+
+@app.command()
+def demo(
+    folder: Annotated[Path, typer.Argument(help="Where the library and the catalog go.")] = Path(
+        "motionary-demo"
+    ),
+    seed: Annotated[int, typer.Option("--seed", help="Of the embedded library.")] = 0,
+    workers: Workers = None,
+) -> None:
+    """Run the main job on the embedded library of made-up motions and show the result."""
+    from motionary.pipeline.synthetic import write_library
+
+    library, catalog = folder / "library", folder / "catalog"
+    log = _stderr()
+    log.print(f"Writing the embedded library to {library}", highlight=False, soft_wrap=True)
+    write_library(library, seed=seed)
+    log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
+    _run([library], str(catalog), _settings(None, {}), library / "labels.csv", workers, None)
+    print(f"\nNext:\n  open {catalog / 'overview.html'} in a browser")
+    print(f'  motionary query {catalog} "select label, count(*) as clips from clusters group by label"')
+    print(f"  motionary status {catalog}")
+
+
+@app.command()
+def status(
+    catalog: CatalogUrl,
+    clip: Annotated[str | None, typer.Option("--clip", help="Show one clip instead.")] = None,
+) -> None:
+    """Show what a catalog holds: clips, clusters, scores, quarantine."""
+    from motionary.workflows.summary import print_clip, print_summary
+    from motionary.workflows.tables import output_console
+
+    opened = _open(catalog)
+    if clip is None:
+        print_summary(opened, output_console())
+    else:
+        print_clip(opened, clip, output_console())
+
+
+@app.command()
+def query(
+    catalog: CatalogUrl,
+    sql: Annotated[str, typer.Argument(metavar="SQL", help="A statement in DuckDB's SQL.")],
+    format_: OutputFormat = "table",
+) -> None:
+    """Ask CATALOG a question in SQL; every table is a view of its name."""
+    from motionary.workflows.tables import write_table
+
+    write_table(_open(catalog).sql(sql), format_)
+
+
+@app.command()
+def graph(
+    out: Annotated[Path, typer.Argument(help="A file ending in .svg or .txt.")],
+    library: Annotated[
+        Path | None,
+        typer.Option("--library", help="Show the graph of this library.", show_default="six clips"),
+    ] = None,
+) -> None:
+    """Draw the Dask graph of the main job."""
+    from motionary.workflows.graph_picture import draw_graph
+
+    draw_graph(out, library)
+    print(f"wrote {out}")
+
+
+def main() -> NoReturn:
+    """Run the command line and exit; expected faults are one line on stderr and exit code 1."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        _fail("interrupted; the same command resumes where it stopped")
+    except Exception as error:
+        if not isinstance(error, _expected()):
+            raise
+        _fail(str(error))
+    sys.exit(0)
+
+
+def _run(
+    libraries: list[Path],
+    catalog: str,
+    config: PipelineConfig,
+    labels: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+) -> None:
+    import os
+    from functools import partial
+
+    from motionary.workflows.main_job import Job, run
+    from motionary.workflows.progress import progress
+    from motionary.workflows.summary import print_summary
+    from motionary.workflows.tables import output_console
+
+    job = Job(
+        [str(one) for one in libraries], catalog, config, labels, workers or os.cpu_count() or 1, scheduler
+    )
+    log = _stderr()
+    result = run(job, partial(progress, console=log))
+    _explain(result, log)
+    print_summary(result.catalog, output_console())
+    if len(result.catalog.quarantine):
+        raise typer.Exit(QUARANTINED)
+
+
+def _explain(result: RunResult, log: Console) -> None:
+    if result.labels_outside:
+        log.print(f"passed over {result.labels_outside} labels of files outside the library", highlight=False)
+    if result.reused:
+        total = result.computed + result.reused
+        log.print(f"{result.reused} of {total} results were there already", highlight=False)
+
+
+def _settings(file: Path | None, options: dict[str, dict[str, Any]]) -> PipelineConfig:
+    from motionary.workflows.settings import load_settings
+
+    return load_settings(file, options)
+
+
+def _open(url: str) -> Any:
+    from motionary.catalog import Catalog
+
+    return Catalog.open(url)
+
+
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+def _expected() -> tuple[type[BaseException], ...]:
+    """Faults that a user can mend. Only looked up when something went wrong: their modules are heavy."""
+    from motionary.catalog import CatalogError
+    from motionary.workflows.labels_file import LabelsError
+    from motionary.workflows.scheduler import SchedulerError
+    from motionary.workflows.settings import SettingsError
+
+    return (CatalogError, LabelsError, SchedulerError, SettingsError, OSError, ValueError)
+
+
+def _fail(message: str) -> NoReturn:
+    print(f"motionary: {message}", file=sys.stderr)
+    sys.exit(FAILED)

@@ -1,0 +1,69 @@
+"""Runs a graph on Dask workers: a running cluster's, or processes of this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from distributed import Client, LocalCluster, as_completed
+
+from motionary.pipeline.graph import Task, TaskReport
+
+
+class SchedulerError(Exception):
+    """The Dask scheduler that was named cannot be reached."""
+
+
+def compute(
+    tasks: Sequence[Task], workers: int, address: str | None, done: Callable[[str], None]
+) -> list[TaskReport]:
+    """Run every task.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        Of a graph.
+    workers : int
+        Processes on this machine; 1 runs in this process. Not used with `address`.
+    address : str, optional
+        A running Dask scheduler.
+    done : callable
+        Called with the stage of every finished task.
+
+    Returns
+    -------
+    list of TaskReport
+        In the order of the tasks.
+
+    Raises
+    ------
+    SchedulerError
+        Nothing answers at `address`.
+    """
+    with _client(workers, address) as client:
+        futures = client.compute([task.delayed for task in tasks])
+        for _, report in as_completed(futures, with_results=True):
+            done(report.stage)
+        return client.gather(futures)
+
+
+@contextmanager
+def _client(workers: int, address: str | None) -> Iterator[Client]:
+    if address is not None:
+        try:
+            client = Client(address, timeout=10)
+        except (OSError, ValueError) as error:
+            raise SchedulerError(f"no Dask scheduler answers at {address}: {error}") from None
+        with client:
+            yield client
+        return
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=workers > 1,
+            dashboard_address="127.0.0.1:0",  # a free port, and nothing for the network to see
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client

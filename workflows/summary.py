@@ -1,0 +1,151 @@
+"""What a run or a catalog has to show, in a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console, Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+
+from motionary.catalog import Catalog
+from motionary.catalog.views.cluster_table import cluster_table
+from motionary.workflows.main_job import OVERVIEW
+from motionary.workflows.tables import text_table
+
+_MOST_CLUSTERS = 40
+
+
+def print_summary(catalog: Catalog, console: Console) -> None:
+    """Print a catalog's clips, clusters, scores, times and place."""
+    run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+    console.print(f"{run['clips']} clips, {run['quarantined']} quarantined, {run['clusters']} clusters")
+    parts: list[RenderableType] = []
+    if run["quarantined"]:
+        parts += ["", quarantine_table(catalog)]
+    if run["clips"]:
+        parts += ["", clusters_shown(catalog), "", cut_table(catalog)]
+    parts += ["", _times(run), "", _places(catalog)]
+    console.print(Group(*parts))
+
+
+def clusters_shown(catalog: Catalog) -> Table:
+    """List the published clusters: size, name, purity where labels are known, reference."""
+    clusters = cluster_table(catalog).to_pylist()
+    rows = [
+        [
+            str(one["cluster_id"]),
+            str(one["size"]),
+            one["label"] or "unnamed",
+            _purity(one["purity"]),
+            one["reference"],
+        ]
+        for one in clusters[:_MOST_CLUSTERS]
+    ]
+    title = "Clusters"
+    if len(clusters) > _MOST_CLUSTERS:
+        title += f' (the {_MOST_CLUSTERS} largest of {len(clusters)}; all: select * from "references")'
+    return text_table(["cluster", "clips", "name", "purity", "reference"], rows, title)
+
+
+def cut_table(catalog: Catalog) -> Table:
+    """List every dendrogram's cut with its scores; the cut is found with the labels hidden."""
+    cuts = catalog.cuts.to_arrow()
+    primary = cuts.filter(cuts["primary"])["method"][0].as_py()
+    shown = [row for row in cuts.to_pylist() if row["method"] in (primary, "fuzzy")]
+    rows = [
+        [
+            f"{row['metric']}{' *' if row['primary'] else ''}",
+            row["method"],
+            f"{row['n_clusters']} ({row['rule']})",
+            _ratio(row["reward_punish"], row["reward_punish_best"]),
+            _number(row["ari"]),
+            _ratio(row["reward_punish_true"], row["reward_punish_best"]),
+            _number(row["ari_true"]),
+            _strip(row),
+        ]
+        for row in shown
+    ]
+    classes = shown[0]["classes"]
+    at = f"at {classes}" if classes else "at true"
+    columns = [
+        "distance",
+        "linkage",
+        "clusters",
+        "reward-punish",
+        "ARI",
+        f"r.-p. {at}",
+        f"ARI {at}",
+        "widest strip",
+    ]
+    published = next(row for row in shown if row["primary"])
+    title = (
+        f"Distances (cuts found with the labels hidden; * the published dendrogram, cut by "
+        f"{published['published_rule']} into {published['published_clusters']})"
+    )
+    return text_table(columns, rows, title)
+
+
+def quarantine_table(catalog: Catalog) -> Table:
+    """List the files that could not be read."""
+    rows = [
+        [row["path"], str(row["line"] or ""), row["reason"], row["mend"]]
+        for row in catalog.quarantine.to_arrow().to_pylist()
+    ]
+    return text_table(["file", "line", "reason", "mend"], rows, "Quarantined")
+
+
+def print_clip(catalog: Catalog, clip_id: str, console: Console) -> None:
+    """Print what is known of one clip.
+
+    Raises
+    ------
+    CatalogError
+        The catalog has no such clip.
+    """
+    motion = catalog.motion(clip_id)
+    row = catalog.sql(
+        """select c.label, c.label_source, c.confidence, c.cluster_id, c.is_reference,
+                  c.distance_to_reference, a.reference_id, a.correlation_before, a.correlation
+           from clusters c join alignments a using (clip_id) where c.clip_id = ?""",
+        [clip_id],
+    ).to_pylist()[0]
+    facts = {
+        "frames": f"{motion.frames} at {motion.fps:g} a second, {motion.seconds:.2f} s",
+        "label": f"{row['label'] or 'none'} ({row['label_source']}, confidence {row['confidence']:.2f})",
+        "cluster": str(row["cluster_id"]) + (", its reference" if row["is_reference"] else ""),
+        "reference": f"{row['reference_id']}, at distance {row['distance_to_reference']:.4f}",
+        "correlation": f"{row['correlation_before']:.3f} length-matched, {row['correlation']:.3f} aligned",
+        "notes": "; ".join(motion.notes) or "none",
+    }
+    console.print(text_table([clip_id, ""], list(facts.items())))
+
+
+def _times(run: dict) -> str:
+    total = (run["finished_at"] - run["started_at"]).total_seconds()
+    stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in run["stage_seconds"])
+    return f"Time: {total:.1f} s from start to end; seconds of work: {stages}"
+
+
+def _places(catalog: Catalog) -> str:
+    store = catalog.store
+    return (
+        f"Catalog:  {escape(store.url)} (snapshot {catalog.snapshot.snapshot_id})\n"
+        f"Overview: {escape(store.full_path(OVERVIEW))}"
+    )
+
+
+def _ratio(value: int | None, best: int | None) -> str:
+    return "-" if value is None or not best else f"{value} / {best}"
+
+
+def _purity(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _strip(row: dict) -> str:
+    if row["strip_clusters"] is None:
+        return "-"
+    return f"{row['strip_clusters']}: {row['strip_low']:.4g} to {row['strip_high']:.4g}"

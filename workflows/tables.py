@@ -1,0 +1,87 @@
+"""Tables for people and for programs: the `--format` of every command that answers with one."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from typing import Literal
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+Format = Literal["table", "json", "csv", "parquet"]
+
+_WIDE = 200  # columns of a table that goes to a file or a pipe
+
+
+def output_console() -> Console:
+    """Return a console on stdout that does not cut lines where nobody looks at them."""
+    return Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+
+
+def write_table(table: pa.Table, format_: Format) -> None:
+    """Write an Arrow table to stdout.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        The answer.
+    format_ : {"table", "json", "csv", "parquet"}
+        json is one list of objects; csv writes nested values as JSON text.
+    """
+    sink = sys.stdout.buffer
+    if format_ == "json":
+        text = json.dumps(table.to_pylist(), default=str, ensure_ascii=False, indent=1)
+        sink.write(text.encode() + b"\n")
+    elif format_ == "csv":
+        pa_csv.write_csv(_flat(table), sink)
+    elif format_ == "parquet":
+        pq.write_table(table, sink, compression="zstd")
+    else:
+        columns = [[_shown(value) for value in column.to_pylist()] for column in table.columns]
+        output_console().print(text_table(table.column_names, list(zip(*columns, strict=True))))
+
+
+def text_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> Table:
+    """Lay text out in columns; those that hold only numbers stand to the right."""
+    made = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for index, name in enumerate(columns):
+        numeric = bool(rows) and all(_is_number(row[index]) for row in rows)
+        made.add_column(Text(name), justify="right" if numeric else "left", overflow="fold")
+    for row in rows:
+        made.add_row(*map(Text, row))  # not markup: a name may hold brackets
+    return made
+
+
+def _flat(table: pa.Table) -> pa.Table:
+    for index, field in enumerate(table.schema):
+        if pa.types.is_nested(field.type):
+            text = [
+                None if value is None else json.dumps(value, default=str)
+                for value in table[index].to_pylist()
+            ]
+            table = table.set_column(index, field.name, pa.array(text, pa.string()))
+    return table
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list) and len(value) > 8:
+        return f"[{', '.join(_shown(one) for one in value[:4])}, … {len(value)} values]"
+    return str(value)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text or "0")
+    except ValueError:
+        return False
+    return True
