@@ -162,7 +162,7 @@ class AlignmentConfig:
     segment_length : int, optional
         L, frames at 30 a second; by default a quarter of the reference, between 8 and half of it.
     slack : int, optional
-        delta, frames; by default the largest the method allows, L - 4 [CoTW 4].
+        delta, frames; by default the largest the method allows, L - 4 [CoTW 4], but at most 60.
     """
 
     segment_length: int | None = None

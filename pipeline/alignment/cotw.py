@@ -37,6 +37,7 @@ from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
 _LEAST_LENGTH = 4  # the least stretched segment: slack <= L - 4 [CoTW 4]
+_MOST_DEFAULT_SLACK = 60  # two seconds at 30 frames a second
 _TIE = 1e-12
 
 
@@ -116,23 +117,31 @@ def cotw(
     )
 
 
-def default_parameters(reference_frames: int) -> tuple[int, int]:
+def default_parameters(reference_frames: int, segment_length: int | None = None) -> tuple[int, int]:
     """Return the segment length and slack taken where none are given.
 
     Parameters
     ----------
     reference_frames : int
         m.
+    segment_length : int, optional
+        L where that is given; of more than m frames there are m.
 
     Returns
     -------
     segment_length, slack : int
         L = m / 4 (rounded, halves to even), between 8 and floor(m / 2); slack = L - 4, the most the method
-        allows. Below 10 frames, where halves would leave no slack, a single segment of all m frames.
+        allows, but at most 60 frames, so that the time it takes grows with m and not with its cube. Below 10
+        frames, where halves would leave no slack, a single segment of all m frames.
     """
     half = reference_frames // 2
-    length = min(max(round(reference_frames / 4), 8), half) if half > _LEAST_LENGTH else reference_frames
-    return length, max(length - _LEAST_LENGTH, 0)
+    if segment_length is not None:
+        length = min(segment_length, reference_frames)
+    elif half > _LEAST_LENGTH:
+        length = min(max(round(reference_frames / 4), 8), half)
+    else:
+        length = reference_frames
+    return length, min(max(length - _LEAST_LENGTH, 0), _MOST_DEFAULT_SLACK)
 
 
 def segment_nodes(frames: int, segment_length: int) -> NDArray[np.int64]:

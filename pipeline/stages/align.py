@@ -67,13 +67,10 @@ def _pose(rows: pa.Table) -> FloatArray:
 
 
 def _warp(moving: FloatArray, reference: FloatArray, config: AlignmentConfig) -> CotwWarp:
-    length, slack = default_parameters(len(reference))
-    if config.segment_length is not None:
-        length = min(config.segment_length, len(reference))
-        slack = length - 4
+    length, slack = default_parameters(len(reference), config.segment_length)
     if config.slack is not None:
-        slack = min(config.slack, length - 4)
-    return cotw(moving, reference, length, max(slack, 0))
+        slack = min(config.slack, max(length - 4, 0))
+    return cotw(moving, reference, length, slack)
 
 
 def _alignment_row(

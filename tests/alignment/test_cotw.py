@@ -1,8 +1,5 @@
 """CoTW against an enumeration of every warp and against a memoised recursion, and its promises."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,10 +13,7 @@ from motionary.pipeline.alignment.cotw import (
     rounding_level,
     segment_nodes,
 )
-
-_spec = importlib.util.spec_from_file_location("naive_alignment", Path(__file__).parent / "naive.py")
-naive = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(naive)
+from tests.alignment import naive
 
 
 def wave(frames: int, dofs: int, seed: int, harmonics: int = 5) -> np.ndarray:
@@ -305,11 +299,16 @@ def test_what_cannot_be_aligned_is_refused(change: dict, problem: str) -> None:
 
 @pytest.mark.parametrize(
     ("frames", "expected"),
-    [(100, (25, 21)), (300, (75, 71)), (40, (10, 6)), (32, (8, 4)), (20, (8, 4)), (16, (8, 4)), (12, (6, 2)),
-     (11, (5, 1)), (10, (5, 1)), (9, (9, 5)), (4, (4, 0)), (3, (3, 0)), (1, (1, 0))],
+    [(20000, (5000, 60)), (300, (75, 60)), (100, (25, 21)), (40, (10, 6)), (32, (8, 4)), (20, (8, 4)),
+     (16, (8, 4)), (12, (6, 2)), (11, (5, 1)), (10, (5, 1)), (9, (9, 5)), (4, (4, 0)), (3, (3, 0)), (1, (1, 0))],
 )  # fmt: skip
 def test_default_parameters(frames: int, expected: tuple[int, int]) -> None:
     assert default_parameters(frames) == expected
+
+
+@pytest.mark.parametrize(("length", "expected"), [(12, (12, 8)), (90, (50, 46)), (5, (5, 1)), (4, (4, 0))])
+def test_default_slack_of_a_given_segment_length(length: int, expected: tuple[int, int]) -> None:
+    assert default_parameters(50, length) == expected
 
 
 @pytest.mark.parametrize("frames", range(1, 130))

@@ -1,8 +1,6 @@
 """The similarity index against eq. 9 as printed, and the choice of a reference."""
 
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionary.pipeline.alignment import score_references, select_reference, similarity_index
-
-_spec = importlib.util.spec_from_file_location("naive_alignment", Path(__file__).parent / "naive.py")
-naive = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(naive)
+from tests.alignment import naive
 
 
 def family(count: int, frames: int, dofs: int, noise: float, seed: int = 0) -> np.ndarray:
