@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 
 from motionary.pipeline.config import DistanceConfig
-from motionary.pipeline.distances import THRESHOLDS, compare_clips, random_thresholds
+from motionary.pipeline.distances import THRESHOLDS, compare_clips, pairwise_distances, random_thresholds
 from motionary.pipeline.stages.columns import matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
@@ -20,7 +20,8 @@ def compare(first: pa.Table, second: pa.Table, config: DistanceConfig) -> dict[s
     Parameters
     ----------
     first, second : pyarrow.Table
-        `resampled` of two batches, or of one and the same; a pair of clips is compared once.
+        `resampled` of two batches, the earlier in clip_id order first, or twice of one; a pair of
+        clips is compared once.
     config : DistanceConfig
         The thresholds.
 
@@ -31,18 +32,21 @@ def compare(first: pa.Table, second: pa.Table, config: DistanceConfig) -> dict[s
     """
     thresholds = THRESHOLDS if config.thresholds == "midpoints" else random_thresholds(config.seed)
     one, other = per_clip(first), per_clip(second)
-    result = compare_clips(
-        [matrix(clip["feature"]) for clip in one.values()],
-        [matrix(clip["feature"]) for clip in other.values()],
-        thresholds,
-    )
-    names_a, names_b = np.array([*one], dtype=object), np.array([*other], dtype=object)
-    i, j = np.nonzero(names_a[:, None] < names_b[None, :])
+    clips, others = ([matrix(clip["feature"]) for clip in batch.values()] for batch in (one, other))
+    if one.keys() == other.keys():
+        result = pairwise_distances(clips, n_jobs=1, thresholds=thresholds)
+        i, j = np.triu_indices(len(clips), 1)
+    else:
+        result = compare_clips(clips, others, thresholds)
+        i, j = np.indices((len(clips), len(others))).reshape(2, -1)
+    curve = result.curve.astype(np.float32).reshape(-1)
     columns = {
-        "clip_a": pa.array(names_a[i], pa.string()),
-        "clip_b": pa.array(names_b[j], pa.string()),
-        "curve": pa.FixedSizeListArray.from_arrays(result.curve[i, j].astype(np.float32).ravel(), 8),
+        "clip_a": pa.array([*one], pa.string()).take(pa.array(i)),
+        "clip_b": pa.array([*other], pa.string()).take(pa.array(j)),
+        "curve": pa.FixedSizeListArray.from_arrays(curve, len(thresholds)),
     }
     for name in ("dtw", "b_dtw", "weighted", "fuzzy_low", "fuzzy_high"):
-        columns[name] = pa.array(getattr(result, name)[i, j].astype(np.float32))
-    return {"pairs": pa.table(columns).select(TABLES["pairs"].names).cast(TABLES["pairs"])}
+        columns[name] = pa.array(getattr(result, name).astype(np.float32).reshape(-1))
+    return {
+        "pairs": pa.table({name: columns[name] for name in TABLES["pairs"].names}, schema=TABLES["pairs"])
+    }

@@ -300,7 +300,8 @@ def test_what_cannot_be_aligned_is_refused(change: dict, problem: str) -> None:
 @pytest.mark.parametrize(
     ("frames", "expected"),
     [(20000, (5000, 60)), (300, (75, 60)), (100, (25, 21)), (40, (10, 6)), (32, (8, 4)), (20, (8, 4)),
-     (16, (8, 4)), (12, (6, 2)), (11, (5, 1)), (10, (5, 1)), (9, (9, 5)), (4, (4, 0)), (3, (3, 0)), (1, (1, 0))],
+     (16, (8, 4)), (12, (6, 2)), (11, (5, 1)), (10, (5, 1)), (9, (9, 5)), (4, (4, 0)), (3, (3, 0)),
+     (1, (1, 0))],
 )  # fmt: skip
 def test_default_parameters(frames: int, expected: tuple[int, int]) -> None:
     assert default_parameters(frames) == expected
