@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 
+from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import Snapshot, current_snapshot
 from motionary.catalog.store import Store
@@ -20,10 +21,6 @@ from motionary.pipeline.stages.motions import read_motion_rows
 if TYPE_CHECKING:
     import duckdb
     import pandas as pd
-
-
-class CatalogError(Exception):
-    """A catalog cannot answer; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -43,18 +40,20 @@ class CatalogTable:
         return self.to_arrow().to_pandas()
 
     def __len__(self) -> int:
-        filesystem = self.store.filesystem
-        return sum(pq.read_metadata(self.store.path(f), filesystem=filesystem).num_rows for f in self.files)
+        return self.store.rows(self.files)
 
     def __repr__(self) -> str:
         return f"<{self.name}: {len(self)} rows, {', '.join(SCHEMAS[self.name].names)}>"
 
 
 class _Table:
-    """Attribute of a catalog that gives the table of the same name."""
+    """Attribute of a catalog that gives a table: that of its own name, or the one named."""
+
+    def __init__(self, name: str = "") -> None:
+        self.name = name
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
+        self.name = self.name or name
 
     def __get__(self, catalog: Catalog | None, owner: type) -> CatalogTable:
         if catalog is None:
@@ -87,9 +86,7 @@ class Catalog:
     clusters = _Table()
     references = _Table()
     alignments = _Table()
-    aligned_frames = property(
-        lambda self: CatalogTable("aligned", self.store, self.snapshot.tables["aligned"])
-    )
+    aligned_frames = _Table("aligned")
     quarantine = _Table()
     runs = _Table()
 
@@ -140,10 +137,10 @@ class Catalog:
         with duckdb.connect() as connection:
             self._create_views(connection)
             try:
-                answer = connection.sql(query, params=parameters)
-                if answer is None:
-                    raise CatalogError("the query answers with no rows; a catalog is only read: select ...")
-                return answer.to_arrow_table()
+                statements = connection.extract_statements(query)
+                if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
+                    raise CatalogError("a catalog is only read: give one statement that selects")
+                return connection.sql(query, params=parameters).to_arrow_table()
             except duckdb.Error as error:
                 raise CatalogError(f"the query cannot be answered: {error}") from error
 

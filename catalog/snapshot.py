@@ -8,13 +8,18 @@ reader sees the old catalog or the new one, and an interrupted run leaves the ol
 from __future__ import annotations
 
 import json
+import posixpath
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import PUBLISHED, VERSION
 from motionary.catalog.store import Store
 
 CURRENT = "CURRENT"
+SNAPSHOTS = "snapshots"
+OVERVIEW = "overview.html"
+"""The page that a run leaves in the catalog's folder."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +49,22 @@ def current_snapshot(store: Store) -> Snapshot | None:
 
     Raises
     ------
-    ValueError
-        The catalog was written by a later version of motionary.
+    CatalogError
+        The catalog was written by a later version of motionary, or its manifest is gone.
     """
     try:
         snapshot_id = store.read_bytes(CURRENT).decode().strip()
     except FileNotFoundError:
         return None
-    manifest = json.loads(store.read_bytes(_manifest_name(snapshot_id)))
+    try:
+        manifest = json.loads(store.read_bytes(_manifest_name(snapshot_id)))
+    except (FileNotFoundError, ValueError) as error:
+        raise CatalogError(
+            f"the manifest of snapshot {snapshot_id!r} of {store.url} is missing or damaged ({error}); "
+            f"write the id of another file of {SNAPSHOTS}/ into {CURRENT}, or run into a new folder"
+        ) from None
     if manifest["schema_version"] > VERSION:
-        raise ValueError(
+        raise CatalogError(
             f"catalog {store.url} has schema version {manifest['schema_version']}, "
             f"this motionary reads up to {VERSION}; install a newer motionary"
         )
@@ -61,9 +72,9 @@ def current_snapshot(store: Store) -> Snapshot | None:
 
 
 def next_snapshot_id(store: Store) -> str:
-    """Return the id that the next snapshot will have."""
-    published = current_snapshot(store)
-    return f"{int(published.snapshot_id) + 1 if published else 1:06d}"
+    """Return the id that the next snapshot will have: one more than any manifest that was ever written."""
+    written = [posixpath.basename(path).removesuffix(".json") for path in store.names(SNAPSHOTS)]
+    return f"{1 + max((int(name) for name in written if name.isdigit()), default=0):06d}"
 
 
 def publish(store: Store, snapshot: Snapshot) -> None:
@@ -88,7 +99,7 @@ def publish(store: Store, snapshot: Snapshot) -> None:
 
 
 def _manifest_name(snapshot_id: str) -> str:
-    return f"snapshots/{snapshot_id}.json"
+    return f"{SNAPSHOTS}/{snapshot_id}.json"
 
 
 def _exists(store: Store, file: str) -> bool:

@@ -85,6 +85,11 @@ class Store:
         tables = [pq.read_table(self.path(file), filesystem=filesystem) for file in files]
         return pa.concat_tables(tables, promote_options="default")
 
+    def rows(self, files: Iterable[str]) -> int:
+        """Count the rows of parts without reading them."""
+        filesystem = self.filesystem
+        return sum(pq.read_metadata(self.path(file), filesystem=filesystem).num_rows for file in files)
+
     def write(self, name: str, content: bytes) -> None:
         """Put a file in place in one step: never half of it, whatever happens meanwhile."""
         filesystem, path = self.filesystem, self.path(name)
@@ -93,12 +98,20 @@ class Store:
             filesystem.pipe_file(path, content)
             return
         temporary = Path(f"{path}.{uuid4().hex}.tmp")
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
+        try:
+            with temporary.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
         _sync_folder(Path(path).parent)
+
+    def names(self, folder: str) -> list[str]:
+        """List the files of a folder; none where there is no folder."""
+        filesystem, path = self.filesystem, self.path(folder)
+        return list(filesystem.ls(path, detail=False)) if filesystem.exists(path) else []
 
     def read_bytes(self, name: str) -> bytes:
         """Read a small file.

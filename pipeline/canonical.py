@@ -170,6 +170,7 @@ CONVENTIONS: tuple[Convention, ...] = (
         "lfemur ltibia lfoot ltoes",
         ("^l", "r"),
     ),
+    # This export leaves out the thorax: Neck lies on the chest, and Neck1 where an ASF's neck is.
     _convention("cmu-bvh", "Hips Spine Spine1 Neck1 Head", _HUMAN_ARM, _HUMAN_LEG, _HUMAN_SIDES),
     _convention(
         "bandai",

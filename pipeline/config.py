@@ -89,7 +89,8 @@ class DistanceConfig:
     seed : int
         Of the draw, under "random".
     tile : int
-        Clips a side of one task's tile of pairs; the results do not depend on it.
+        Clips a side of a tile of pairs, about, and of a batch that is read together; 32 by default. The
+        results do not depend on it.
     """
 
     thresholds: Literal["midpoints", "random"] = "midpoints"
@@ -193,14 +194,6 @@ class PipelineConfig:
     distances: DistanceConfig = field(default_factory=DistanceConfig)
     clusters: ClusterConfig = field(default_factory=ClusterConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
-
-
-def paper_config() -> PipelineConfig:
-    """Return the settings of `--paper`: the paper's pose, complete linkage, the widest threshold strip."""
-    return PipelineConfig(
-        features=FeatureConfig(kind="paper"),
-        clusters=ClusterConfig(primary="complete", cut="strip"),
-    )
 
 
 def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:

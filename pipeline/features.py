@@ -28,7 +28,7 @@ _TOES = [CANONICAL_JOINTS.index("left_toe"), CANONICAL_JOINTS.index("right_toe")
 _SMOOTHING = 5  # frames of the velocity's running mean
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrameFeatures:
     """A motion at the common frame rate, as vectors, with what normalising took away.
 

@@ -18,7 +18,8 @@ from itertools import combinations_with_replacement
 from typing import Any, Protocol
 
 import pyarrow as pa
-from dask.delayed import Delayed, delayed
+from dask.task_spec import List, TaskRef
+from dask.task_spec import Task as DaskTask
 
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.readers.library import Source
@@ -50,16 +51,16 @@ class TaskReport:
 
 @dataclass(frozen=True)
 class Task:
-    """A task of the graph; `delayed` computes to its `TaskReport`.
+    """A task of the graph; `node` computes to its `TaskReport`.
 
-    `reads` are the keys of the tasks it waits for, `makes` the tables it stores.
+    `reads` are the keys of the results it waits for, `makes` the tables it stores.
     """
 
     stage: str
     key: str
     reads: tuple[str, ...]
     makes: tuple[str, ...]
-    delayed: Delayed
+    node: DaskTask
 
 
 def build_graph(
@@ -83,8 +84,7 @@ def build_graph(
     list of Task
         Every task, after those it reads from.
     """
-    size = config.distances.tile
-    batches = [sources[start : start + size] for start in range(0, len(sources), size)]
+    batches = batched_by_name(sources, config.distances.tile)
 
     ingested = [_ingest_task(batch, config, store) for batch in batches]
     tiles = [
@@ -118,8 +118,23 @@ def build_graph(
     return [*ingested, *tiles, clustered, represented, *aligned]
 
 
+def batched_by_name(sources: Sequence[Source], size: int) -> list[list[Source]]:
+    """Cut a library into batches of about `size` clips, twice that at most.
+
+    A batch ends after a clip whose name says so, by its digest. So a clip that comes or goes changes its own
+    batch, not all that follow, and the results of the others are found again.
+    """
+    batches: list[list[Source]] = [[]]
+    for source in sources:
+        batches[-1].append(source)
+        drawn = int.from_bytes(hashlib.blake2b(source.clip_id.encode(), digest_size=8).digest())
+        if drawn % size == 0 or len(batches[-1]) == 2 * size:
+            batches.append([])
+    return [batch for batch in batches if batch]
+
+
 def _ingest_task(batch: Sequence[Source], config: PipelineConfig, store: TableStore) -> Task:
-    files = [(source.clip_id, source.digest) for source in batch]
+    files = [(source.clip_id, source.path, source.digest) for source in batch]
     return _task(
         store, "ingest", ingest.ingest, ingest.VERSION, ingest.MAKES,
         reads=[], settings=(asdict(config.read), asdict(config.features), files), arguments=(batch, config),
@@ -144,10 +159,9 @@ def _task(
     stored = [(table, [task.key for task in tasks]) for table, tasks in reads]
     about = json.dumps([stage, version, settings, stored], sort_keys=True)
     key = hashlib.blake2b(about.encode(), digest_size=16).hexdigest()
-    before = {task.key: task.delayed for _, tasks in reads for task in tasks}
-    call = delayed(run_task, pure=True)
-    node = call(
-        stage, key, makes, store, body, stored, arguments, [*before.values()], dask_key_name=f"{stage}-{key}"
+    before = {task.key: TaskRef(task.node.key) for _, tasks in reads for task in tasks}
+    node = DaskTask(
+        f"{stage}-{key}", run_task, stage, key, makes, store, body, stored, arguments, List(*before.values())
     )
     return Task(stage, key, tuple(before), makes, node)
 

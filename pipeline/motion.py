@@ -87,7 +87,7 @@ class Skeleton:
         return {name: i for i, name in enumerate(self.names)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """One take of motion capture.
 

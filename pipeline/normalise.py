@@ -26,7 +26,7 @@ _RIGHT = [CANONICAL_JOINTS.index("right_hip"), CANONICAL_JOINTS.index("right_sho
 _SHORT_ACROSS = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NormalisedPose:
     """Poses in their own heading frame, and what was taken away.
 
@@ -93,7 +93,8 @@ def headings(joints: FloatArray) -> FloatArray:
     -------
     array (T,)
         Radians from +Z towards +X, unwrapped. Where the across vector is too short on the ground, taken
-        between the nearest good frames; 0 throughout where there is none.
+        between the nearest good frames; 0 throughout where there is none. Too short is under a tenth of the
+        vector's usual length in space, which stays what it is in a clip that lies most of the time.
     """
     across = (joints[:, _LEFT] - joints[:, _RIGHT]).sum(axis=1)
     on_ground = np.hypot(across[:, 0], across[:, 2])

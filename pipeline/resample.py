@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from motionary.pipeline.motion import FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Resampled:
     """Groups of frames and the frame each became.
 

@@ -63,3 +63,35 @@ def test_a_users_convention_is_checked():
 def test_the_drawing_tree_has_parents_before_children():
     assert len(CANONICAL_PARENTS) == len(CANONICAL_JOINTS)
     assert all(parent < joint for joint, parent in enumerate(CANONICAL_PARENTS))
+
+
+# Joint lists as these rigs are exported.
+ARMS = "LeftShoulder LeftArm LeftForeArm LeftHand RightShoulder RightArm RightForeArm RightHand"
+REAL = {
+    "mixamo": f"""Hips Spine Spine1 Spine2 Neck Head HeadTop_End {ARMS}
+        LeftUpLeg LeftLeg LeftFoot LeftToeBase LeftToe_End
+        RightUpLeg RightLeg RightFoot RightToeBase RightToe_End""",
+    "lafan1": f"""Hips LeftUpLeg LeftLeg LeftFoot LeftToe RightUpLeg RightLeg RightFoot RightToe
+        Spine Spine1 Spine2 Neck Head {ARMS}""",
+    "humanik": f"""Hips LeftUpLeg LeftLeg LeftFoot LeftToeBase RightUpLeg RightLeg RightFoot RightToeBase
+        Spine Spine1 {ARMS} Neck Head""",
+    "xsens": """Hips Chest Chest2 Chest3 Chest4 Neck Head RightCollar RightShoulder RightElbow RightWrist
+        LeftCollar LeftShoulder LeftElbow LeftWrist RightHip RightKnee RightAnkle RightToe
+        LeftHip LeftKnee LeftAnkle LeftToe""",
+    "smpl": """Pelvis L_Hip R_Hip Spine1 L_Knee R_Knee Spine2 L_Ankle R_Ankle Spine3 L_Foot R_Foot Neck
+        L_Collar R_Collar Head L_Shoulder R_Shoulder L_Elbow R_Elbow L_Wrist R_Wrist L_Hand R_Hand""",
+    "smpl-x": """pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3
+        left_foot right_foot neck left_collar right_collar head left_shoulder right_shoulder left_elbow
+        right_elbow left_wrist right_wrist jaw""",
+    "unreal-4": """root pelvis spine_01 spine_02 spine_03 clavicle_l upperarm_l lowerarm_l hand_l
+        clavicle_r upperarm_r lowerarm_r hand_r neck_01 head
+        thigh_l calf_l foot_l ball_l thigh_r calf_r foot_r ball_r""",
+    "unreal-5": """root pelvis spine_01 spine_02 spine_03 spine_04 spine_05 clavicle_l upperarm_l lowerarm_l
+        hand_l clavicle_r upperarm_r lowerarm_r hand_r neck_01 neck_02 head
+        thigh_l calf_l foot_l ball_l thigh_r calf_r foot_r ball_r""",
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_exported_rigs_are_recognised(name):
+    assert find_convention(REAL[name].split()).name == name

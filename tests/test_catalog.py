@@ -102,13 +102,14 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="power cut"):
         store.write("name", b"new and longer")
     assert store.read_bytes("name") == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["name"]
 
 
 def test_a_later_schema_is_refused(tmp_path):
     store = Store(str(tmp_path))
     snapshot = empty_snapshot(store)
     publish(store, Snapshot(snapshot.snapshot_id, "", snapshot.tables, VERSION + 1))
-    with pytest.raises(ValueError, match=f"schema version {VERSION + 1}.*install a newer"):
+    with pytest.raises(CatalogError, match=f"schema version {VERSION + 1}.*install a newer"):
         Catalog.open(str(tmp_path))
 
 

@@ -85,7 +85,10 @@ def test_a_run_with_quarantined_clips_exits_3(motionary, demo_library, tmp_path)
         (("run", "nowhere", "out"), 1, "nowhere"),
         (("run", "{library}", "{out}", "--labels", "none.csv"), 1, "no labels file none.csv"),
         (("run", "{library}", "{out}", "--config", "none.toml"), 1, "no configuration file none.toml"),
-        (("run", "{library}", "{out}", "--clusters", "2", "--threshold", "1"), 1, "give one"),
+        (("run", "{library}", "{out}", "--clusters", "2", "--threshold", "1"), 2, "not both"),
+        (("run", "{library}", "{out}", "--clusters", "999"), 1, "999 clusters are asked for"),
+        (("query", "{catalog}", "create table t as select 1"), 1, "a catalog is only read"),
+        (("query", "{catalog}", "select 1; select 2"), 1, "give one statement"),
         (
             ("run", "{library}", "{out}", "--labels", "{labels}", "--label-column", "mood"),
             1,
@@ -174,7 +177,7 @@ def test_graph_as_text_and_picture(motionary, tmp_path, demo_library):
     motionary("graph", tmp_path / "graph.svg", "--library", demo_library)
     picture = (tmp_path / "graph.svg").read_text()
     assert picture.startswith("<svg")
-    assert "ingest: 3 tasks" in picture
+    assert picture.count("<rect") > picture.count(">ingest ") > 1
 
 
 def test_names_with_brackets_and_columns_of_one_name_are_shown(motionary, demo_catalog):

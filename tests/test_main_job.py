@@ -181,6 +181,7 @@ def test_what_cannot_be_read_is_quarantined_and_nothing_else_is_missing(few, tmp
         "cart.bvh",
     }
     assert all(row["reason"] and row["mend"] for row in rows.values())
+    assert all(row["line"] for path, row in rows.items() if path != "cart.bvh")
     assert rows["nan.bvh"]["line"] == motion + 5
     assert rows["letter.bvh"]["line"] == 1
     assert len(catalog.clips) == 8
@@ -267,3 +268,21 @@ def test_any_tool_reads_the_parquet(demo_catalog):
     assert sum(len(pd.read_parquet(file)) for file in files) == expected
     assert sum(len(pq.read_table(file)) for file in files) == expected
     assert pq.read_schema(files[0]).field("weighted").metadata[b"unit"] == b"feature"
+
+
+def test_a_clip_that_changes_under_the_run_is_set_aside(few, tmp_path, silent_progress, monkeypatch):
+    usual = ingest.read_motion
+
+    def meanwhile(path, **options):
+        motion = usual(path, **options)
+        if path.endswith(changed.name):
+            changed.write_text(changed.read_text() + "\n")
+        return motion
+
+    changed = next(few.rglob("walk*.bvh"))
+    monkeypatch.setattr(ingest, "read_motion", meanwhile)
+    catalog = run(job(few, tmp_path / "out"), silent_progress).catalog
+    (row,) = catalog.quarantine.to_arrow().to_pylist()
+    assert (row["reason"], row["mend"]) == ("it changed while the run was reading it", "run again")
+    monkeypatch.undo()
+    assert len(run(job(few, tmp_path / "out"), silent_progress).catalog.clips) == 8

@@ -18,7 +18,7 @@ from motionary.pipeline.evaluation import (
 from motionary.pipeline.features import motion_features
 from motionary.pipeline.readers import read_motion
 from motionary.pipeline.readers.library import scan_library
-from motionary.pipeline.stages.columns import condensed
+from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.workflows.main_job import Job, run
 
 DRAWS = 100
@@ -40,6 +40,7 @@ def hdm05(shared_data) -> tuple[np.ndarray, dict[str, PairwiseDistances]]:
     sources = scan_library(shared_data / "hdm05")
     labels = pd.read_csv(shared_data / "labels.csv").set_index("path").action
     motions = [read_motion(source.files[0]) for source in sources]
+    assert len(motions) == 108
     classes = np.array([labels[f"hdm05/{source.path}"] for source in sources])
     kinds = ("pose+travel", "paper")
     features = {
@@ -111,9 +112,9 @@ def test_all_conventions_in_one_catalog(everything):
 def test_the_nearest_clip_of_another_dataset_to_a_walk_or_run_is_one(everything):
     clips = everything.clips.to_pandas()
     gait = clips.action.map(WALK_OR_RUN)
-    square = squareform(
-        condensed(everything.pairs.to_arrow(), everything.clips.to_arrow()["clip_id"], "weighted")
-    )
+    pairs = everything.pairs.to_arrow()
+    places = condensed_places(pairs, everything.clips.to_arrow()["clip_id"])
+    square = squareform(condensed(pairs, "weighted", places))
     asked = clips.action.isin(["walk", "run", "run-jog"]).to_numpy()
     # Every clip may answer, only walks and runs ask.
     answers = square.copy()

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
+from motionary.workflows.errors import UserError
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -81,6 +83,8 @@ def run(
     scheduler: Scheduler = None,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
+    if clusters is not None and threshold is not None:
+        raise typer.BadParameter("give --clusters or --threshold, not both")
     options: dict[str, dict[str, Any]] = {"clusters": {}, "features": {}}
     if paper:
         from motionary.workflows.settings import PAPER
@@ -151,7 +155,7 @@ def graph(
     out: Annotated[Path, typer.Argument(help="A file ending in .svg or .txt.")],
     library: Annotated[
         Path | None,
-        typer.Option("--library", help="Show the graph of this library.", show_default="six clips"),
+        typer.Option("--library", help="Show the graph of this library.", show_default="three clips"),
     ] = None,
 ) -> None:
     """Draw the Dask graph of the main job."""
@@ -162,13 +166,15 @@ def graph(
 
 
 def main() -> NoReturn:
-    """Run the command line and exit; expected faults are one line on stderr and exit code 1."""
+    """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
     try:
-        app()
-    except KeyboardInterrupt:
-        _fail("interrupted; the same command resumes where it stopped")
+        app(prog_name="motionary")
+    except (UserError, OSError) as error:
+        _fail(str(error))
     except Exception as error:
-        if not isinstance(error, _expected()):
+        from motionary.catalog import CatalogError
+
+        if not isinstance(error, CatalogError):
             raise
         _fail(str(error))
     sys.exit(0)
@@ -182,19 +188,22 @@ def _run(
     workers: int | None,
     scheduler: str | None,
 ) -> None:
-    import os
     from functools import partial
 
+    from motionary.pipeline.distances.pairwise import usable_processors
     from motionary.workflows.main_job import Job, run
     from motionary.workflows.progress import progress
     from motionary.workflows.summary import print_summary
     from motionary.workflows.tables import output_console
 
     job = Job(
-        [str(one) for one in libraries], catalog, config, labels, workers or os.cpu_count() or 1, scheduler
+        [str(one) for one in libraries], catalog, config, labels, workers or usable_processors(), scheduler
     )
     log = _stderr()
-    result = run(job, partial(progress, console=log))
+    try:
+        result = run(job, partial(progress, console=log))
+    except KeyboardInterrupt:
+        _fail("interrupted; the published catalog is as it was, and the same command resumes")
     _explain(result, log)
     print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
@@ -225,16 +234,6 @@ def _stderr() -> Console:
     from rich.console import Console
 
     return Console(stderr=True)
-
-
-def _expected() -> tuple[type[BaseException], ...]:
-    """Faults that a user can mend. Only looked up when something went wrong: their modules are heavy."""
-    from motionary.catalog import CatalogError
-    from motionary.workflows.labels_file import LabelsError
-    from motionary.workflows.scheduler import SchedulerError
-    from motionary.workflows.settings import SettingsError
-
-    return (CatalogError, LabelsError, SchedulerError, SettingsError, OSError, ValueError)
 
 
 def _fail(message: str) -> NoReturn:

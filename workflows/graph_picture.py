@@ -11,8 +11,10 @@ import pyarrow as pa
 
 from motionary.pipeline.config import DistanceConfig, PipelineConfig
 from motionary.pipeline.graph import Task, build_graph
-from motionary.pipeline.readers.library import Source, scan_library
+from motionary.pipeline.readers.library import Source
+from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import NO_LABELS
+from motionary.workflows.main_job import library_sources
 
 _BOX, _GAP, _COLUMN = (150, 26), 10, 250
 _MOST_IN_COLUMN = 40
@@ -46,20 +48,20 @@ def draw_graph(out: Path, library: Path | None) -> None:
     out : Path
         Ending in .svg or .txt.
     library : Path, optional
-        Left out, a library of six clips in batches of two.
+        Left out, a library of three clips in batches of one.
 
     Raises
     ------
-    ValueError
-        Another ending.
+    UserError
+        Another ending, or no such library.
     """
     if out.suffix not in (".svg", ".txt"):
-        raise ValueError(f"{out} ends in {out.suffix or 'nothing'!r}; a graph is written as .svg or .txt")
+        raise UserError(f"{out} ends in {out.suffix or 'nothing'!r}; a graph is written as .svg or .txt")
     if library is None:
-        sources = [Source(f"clip-{n}.bvh", f"clip-{n}.bvh", "", (), str(n), "bvh") for n in range(6)]
-        config = PipelineConfig(distances=DistanceConfig(tile=2))
+        sources = [Source(f"clip-{n}.bvh", f"clip-{n}.bvh", "", (), str(n), "bvh") for n in range(3)]
+        config = PipelineConfig(distances=DistanceConfig(tile=1))
     else:
-        sources, config = scan_library(library), PipelineConfig()
+        sources, config = library_sources([str(library)]), PipelineConfig()
     tasks = build_graph(sources, NO_LABELS.table, config, _NoStore())
     out.write_text(_text(tasks) if out.suffix == ".txt" else _svg(tasks), encoding="utf-8")
 

@@ -15,9 +15,10 @@ import pandas as pd
 import pyarrow as pa
 
 from motionary.pipeline.readers.library import Source
+from motionary.workflows.errors import UserError
 
 
-class LabelsError(Exception):
+class LabelsError(UserError):
     """A labels file cannot be used; the message names the file, the place and the mend."""
 
 

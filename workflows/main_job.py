@@ -16,16 +16,15 @@ import pyarrow as pa
 
 from motionary.catalog import Catalog
 from motionary.catalog.schema import PUBLISHED, SCHEMAS
-from motionary.catalog.snapshot import Snapshot, current_snapshot, next_snapshot_id, publish
+from motionary.catalog.snapshot import OVERVIEW, Snapshot, current_snapshot, next_snapshot_id, publish
 from motionary.catalog.store import Store
 from motionary.catalog.views.overview import overview_page
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import Task, TaskReport, build_graph
-from motionary.pipeline.readers.library import scan_library
+from motionary.pipeline.readers.library import Source, scan_library
+from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import NO_LABELS, read_labels
 from motionary.workflows.scheduler import compute
-
-OVERVIEW = "overview.html"
 
 
 @dataclass(frozen=True)
@@ -92,16 +91,16 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
 
     Raises
     ------
-    FileNotFoundError, ValueError
-        The library is missing or holds no clip.
-    LabelsError
-        The labels file cannot be used.
-    SchedulerError
-        The scheduler cannot be reached.
+    UserError
+        The library is missing or holds no clip or too few, the labels file cannot be used, or the scheduler
+        cannot be reached.
     """
     started = datetime.now(UTC)
     roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
-    sources = scan_library(roots)
+    sources = library_sources(roots)
+    wanted = job.config.clusters.n_clusters
+    if wanted is not None and wanted > len(sources):
+        raise UserError(f"{wanted} clusters are asked for, and the library holds {len(sources)} clips")
     column = job.config.clusters.label_column
     labels = read_labels(job.labels, sources, column) if job.labels else NO_LABELS
 
@@ -113,6 +112,20 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
     catalog = _publish(store, tasks, reports, job, roots, started)
     computed = sum(report.computed for report in reports)
     return RunResult(catalog, labels.outside, computed, len(reports) - computed)
+
+
+def library_sources(roots: Sequence[str]) -> list[Source]:
+    """List the clips of libraries.
+
+    Raises
+    ------
+    UserError
+        A library is missing or holds no clip.
+    """
+    try:
+        return scan_library(roots)
+    except (OSError, ValueError) as error:
+        raise UserError(str(error)) from error
 
 
 def absolute(url: str) -> str:
@@ -143,9 +156,9 @@ def _publish(
         "version": version("motionary"),
         "library": list(roots),
         "settings": json.dumps(asdict(job.config), sort_keys=True),
-        "clips": len(store.read(files["clips"])),
-        "quarantined": len(store.read(files["quarantine"])),
-        "clusters": len(store.read(files["references"])),
+        "clips": store.rows(files["clips"]),
+        "quarantined": store.rows(files["quarantine"]),
+        "clusters": store.rows(files["references"]),
         "stage_seconds": list(_stage_seconds(reports).items()),
     }
     store.save(run_id, {"runs": pa.Table.from_pylist([record], schema=SCHEMAS["runs"])})

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from distributed import Client, LocalCluster, as_completed
 
 from motionary.pipeline.graph import Task, TaskReport
+from motionary.workflows.errors import UserError
 
 
-class SchedulerError(Exception):
+class SchedulerError(UserError):
     """The Dask scheduler that was named cannot be reached."""
 
 
@@ -40,8 +42,11 @@ def compute(
     SchedulerError
         Nothing answers at `address`.
     """
+    # What a task raises is raised here as well; the worker's own account of it would only repeat it.
+    logging.getLogger("distributed.worker").setLevel(logging.CRITICAL)
     with _client(workers, address) as client:
-        futures = client.compute([task.delayed for task in tasks])
+        graph = {task.node.key: task.node for task in tasks}
+        futures = client.get(graph, list(graph), sync=False)
         for _, report in as_completed(futures, with_results=True):
             done(report.stage)
         return client.gather(futures)

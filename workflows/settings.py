@@ -27,6 +27,7 @@ from motionary.pipeline.config import (
     PipelineConfig,
     ReadConfig,
 )
+from motionary.workflows.errors import UserError
 
 PAPER: dict[str, Any] = {
     "features": {"kind": "paper"},
@@ -35,7 +36,7 @@ PAPER: dict[str, Any] = {
 """What `--paper` sets: the paper's pose, complete linkage, the widest threshold strip."""
 
 
-class SettingsError(Exception):
+class SettingsError(UserError):
     """A setting is not valid; the message names it."""
 
 

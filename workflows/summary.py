@@ -7,8 +7,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from motionary.catalog import Catalog
+from motionary.catalog.snapshot import OVERVIEW
 from motionary.catalog.views.cluster_table import cluster_table
-from motionary.workflows.main_job import OVERVIEW
+from motionary.catalog.views.linkages import linkages_by_distance
 from motionary.workflows.tables import text_table
 
 _MOST_CLUSTERS = 40
@@ -48,9 +49,7 @@ def clusters_shown(catalog: Catalog) -> Table:
 
 def cut_table(catalog: Catalog) -> Table:
     """List every dendrogram's cut with its scores; the cut is found with the labels hidden."""
-    cuts = catalog.cuts.to_arrow()
-    primary = cuts.filter(cuts["primary"])["method"][0].as_py()
-    shown = [row for row in cuts.to_pylist() if row["method"] in (primary, "fuzzy")]
+    shown = [one.cut for one in linkages_by_distance(catalog)]
     rows = [
         [
             f"{row['metric']}{' *' if row['primary'] else ''}",

@@ -30,7 +30,6 @@ from operator import index
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.alignment.cotw_kernels import best_step, segment_table
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import Warp, checked_sequence, interpolate
 from motionary.pipeline.alignment.weights import checked_weights
@@ -175,6 +174,8 @@ def correlation_tables(
         Row: eta + slack. Column: the segment's first output frame, from nodes[k] - r_k on. Cells that no warp
         reaches are 0 and never read. A cell's bits do not depend on `slack`.
     """
+    from motionary.pipeline.alignment.cotw_kernels import segment_table
+
     moving_floor, reference_floor = rounding_level(moving) ** 2, rounding_level(reference) ** 2
     matched = interpolate(moving.astype(np.float64), uniform_times(len(moving), len(reference)))
     source = np.ascontiguousarray((matched - matched.mean(axis=0)).T)
@@ -206,6 +207,8 @@ def best_stretches(tables: list[FloatArray], slack: int, tie: float) -> tuple[fl
     objective : float
     eta : array (c,) int64
     """
+    from motionary.pipeline.alignment.cotw_kernels import best_step
+
     segments = len(tables)
     radii = _node_radii(segments, slack)
     best: FloatArray = np.zeros(1)

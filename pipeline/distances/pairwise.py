@@ -24,7 +24,7 @@ from motionary.pipeline.distances.zones import checked_thresholds
 from motionary.pipeline.motion import FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PairwiseDistances:
     """Distances of pairs of clips, in the unit of their features.
 
@@ -134,7 +134,7 @@ def pairwise_distances(
             dtw[place], b_dtw[place] = tile_dtw[row, skipped:], tile_b_dtw[row, skipped:]
             curve[place] = tile_curve[row, skipped:]
 
-    with ThreadPoolExecutor(n_jobs or _processors()) as threads:
+    with ThreadPoolExecutor(n_jobs or usable_processors()) as threads:
         for task in [threads.submit(compare, i, j) for i in starts for j in starts if i <= j]:
             task.result()
     return _record(dtw, b_dtw, curve, lambdas)
@@ -149,7 +149,8 @@ def _checked(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[FloatArra
     return arrays
 
 
-def _processors() -> int:
+def usable_processors() -> int:
+    """Count the processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -91,7 +91,7 @@ def _skeleton_of(path: Path) -> Path:
     if found is None:
         there = ", ".join(p.name for p in candidates[:10]) or "none"
         mend = "put its ASF beside it, named as the AMC's name begins, or give skeleton="
-        raise ReadError(path, None, f"no ASF belongs to it (ASF files in its folder: {there})", mend)
+        raise ReadError(path, 1, f"no ASF belongs to it (ASF files in its folder: {there})", mend)
     return found
 
 

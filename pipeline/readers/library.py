@@ -36,8 +36,8 @@ class Source:
     files : tuple of str
         Every file it is read from: itself, then an AMC's ASF where there is one.
     digest : str
-        BLAKE2b, 128 bits, in hexadecimal, over the contents of `files` one after the other; empty where one
-        cannot be opened (reading the clip then says why).
+        BLAKE2b, 128 bits, in hexadecimal, over the lengths and contents of `files`; empty where one cannot be
+        opened (reading the clip then says why).
     format : str
         "bvh" or "asf/amc".
     """
@@ -126,7 +126,9 @@ def _source(path: Path, root: Path, prefix: str, skeletons: Sequence[Path]) -> S
     if skeleton is not None:
         files.append(skeleton)
     place = os.fsencode(path.relative_to(root).as_posix()).decode("utf-8", "backslashreplace")
-    return Source(prefix + place, place, str(root), tuple(map(str, files)), _digest(files), kind)
+    return Source(
+        prefix + place, place, str(root), tuple(map(str, files)), digest_of(tuple(map(str, files))), kind
+    )
 
 
 def _refuse(error: OSError) -> None:
@@ -136,11 +138,14 @@ def _refuse(error: OSError) -> None:
     ) from error
 
 
-def _digest(files: Sequence[Path]) -> str:
+def digest_of(files: Sequence[str]) -> str:
+    """Digest the contents of files, each with its length; empty where one cannot be opened."""
     digest = blake2b(digest_size=16)
     try:
-        for path in files:
-            digest.update(path.read_bytes())
+        for file in files:
+            content = Path(file).read_bytes()
+            digest.update(len(content).to_bytes(8, "little"))
+            digest.update(content)
     except OSError:
         return ""
     return digest.hexdigest()

@@ -45,7 +45,7 @@ def read_lines(path: Path) -> list[str]:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     if not text.strip():
-        raise ReadError(path, None, "the file is empty", "copy or export it again")
+        raise ReadError(path, 1, "the file is empty", "copy or export it again")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -21,7 +21,7 @@ from motionary.pipeline.clustering import (
 )
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.evaluation import adjusted_rand_index, best_reward_punish, reward_punish
-from motionary.pipeline.stages.columns import condensed
+from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.pipeline.tables import LABEL_COLUMNS, TABLES
 
 VERSION = 1
@@ -44,7 +44,7 @@ class Dendrogram:
     linkage : array (N - 1, 4)
         SciPy linkage matrix.
     cut : Cut
-        As the configuration says, labels hidden.
+        Automatic, labels hidden; by the modularity of this distance's own nearest-neighbour graph.
     """
 
     method: str
@@ -112,12 +112,13 @@ def join_labels(ingested: pa.Table, labels: pa.Table) -> pa.Table:
 
 def _dendrograms(clip_ids: pa.ChunkedArray, pairs: pa.Table, config: ClusterConfig) -> list[Dendrogram]:
     made = []
+    place = condensed_places(pairs, clip_ids)
     for metric in _METRICS:
-        distances = condensed(pairs, clip_ids, metric)
+        distances = condensed(pairs, metric, place)
         for method in dict.fromkeys(("complete", "ward", config.primary)):
             if method in _LINKAGES:
                 made.append(_dendrogram(method, metric, distances, _LINKAGES[method](distances), config))
-    low, high = (condensed(pairs, clip_ids, name) for name in ("fuzzy_low", "fuzzy_high"))
+    low, high = (condensed(pairs, name, place) for name in ("fuzzy_low", "fuzzy_high"))
     key = low + config.fuzzy_tau * (high - low)
     made.append(_dendrogram("fuzzy", "fuzzy", key, fuzzy_linkage(low, high, tau=config.fuzzy_tau), config))
     return made
@@ -126,7 +127,9 @@ def _dendrograms(clip_ids: pa.ChunkedArray, pairs: pa.Table, config: ClusterConf
 def _dendrogram(
     method: str, metric: str, distances: NDArray, linkage: NDArray, config: ClusterConfig
 ) -> Dendrogram:
-    return Dendrogram(method, metric, distances, linkage, choose_cut(linkage, distances, config))
+    # A threshold or a count is asked of the published clusters; the others have heights of their own.
+    automatic = replace(config, threshold=None, n_clusters=None)
+    return Dendrogram(method, metric, distances, linkage, choose_cut(linkage, distances, automatic))
 
 
 def _is_primary(dendrogram: Dendrogram, config: ClusterConfig) -> bool:

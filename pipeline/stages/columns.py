@@ -41,8 +41,8 @@ def per_clip(table: pa.Table) -> dict[str, pa.Table]:
     return {names[codes[start]]: table.slice(start, end - start) for start, end in pairwise(bounds)}
 
 
-def condensed(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray, column: str) -> NDArray[np.float64]:
-    """Lay one distance of a table of pairs out in SciPy's condensed order.
+def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> NDArray[np.int64]:
+    """Find where each row of a table of pairs stands in SciPy's condensed order.
 
     Parameters
     ----------
@@ -50,8 +50,6 @@ def condensed(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray, column: str
         With clip_a and clip_b, every pair of the clips once, in any order.
     clip_ids : array (N,)
         The clips, in the order that the condensed array is to follow.
-    column : str
-        The distance.
 
     Returns
     -------
@@ -70,6 +68,11 @@ def condensed(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray, column: str
     a = pc.index_in(pairs["clip_a"], ids).to_numpy().astype(np.int64)
     b = pc.index_in(pairs["clip_b"], ids).to_numpy().astype(np.int64)
     first, second = np.minimum(a, b), np.maximum(a, b)
-    distances = np.empty(size)
-    distances[first * count - first * (first + 1) // 2 + second - first - 1] = pairs[column].to_numpy()
+    return first * count - first * (first + 1) // 2 + second - first - 1
+
+
+def condensed(pairs: pa.Table, column: str, places: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Lay one distance of a table of pairs out in SciPy's condensed order, see `condensed_places`."""
+    distances = np.empty(len(places))
+    distances[places] = pairs[column].to_numpy()
     return distances

@@ -15,7 +15,7 @@ from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.features import FrameFeatures, frame_features, merged
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import ReadError, read_motion
-from motionary.pipeline.readers.library import Source
+from motionary.pipeline.readers.library import Source, digest_of
 from motionary.pipeline.resample import Resampled
 from motionary.pipeline.stages.columns import vectors
 from motionary.pipeline.stages.motions import motion_rows, skeleton_record
@@ -60,7 +60,10 @@ def ingest(sources: Sequence[Source], config: PipelineConfig) -> dict[str, pa.Ta
 
 
 def _ingest_one(source: Source, config: PipelineConfig) -> dict[str, pa.Table]:
-    motion = read_motion(source.files[0], **asdict(config.read))
+    skeleton = source.files[1] if len(source.files) > 1 else None
+    motion = read_motion(source.files[0], skeleton=skeleton, **asdict(config.read))
+    if digest_of(source.files) != source.digest:
+        raise ReadError(source.files[0], None, "it changed while the run was reading it", "run again")
     compared = frame_features(motion, config.features)
     # Alignment and style always read pose and travel, whatever the distances compare.
     kept = compared

@@ -10,7 +10,7 @@ from scipy.spatial.distance import squareform
 from motionary.pipeline.alignment import score_references
 from motionary.pipeline.clustering import Names, name_clusters
 from motionary.pipeline.config import ClusterConfig
-from motionary.pipeline.stages.columns import POSE_COLUMNS, condensed, matrix, per_clip
+from motionary.pipeline.stages.columns import POSE_COLUMNS, condensed, condensed_places, matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
 VERSION = 1
@@ -44,7 +44,8 @@ def represent(
         return {name: TABLES[name].empty_table() for name in MAKES}
     clip_ids = clips["clip_id"].to_pylist()
     cluster_of = members["cluster_id"].to_numpy()
-    square = squareform(condensed(pairs, clips["clip_id"], config.metric))
+    places = condensed_places(pairs, clips["clip_id"])
+    square, weighted = (squareform(condensed(pairs, name, places)) for name in (config.metric, "weighted"))
     sequences = per_clip(features)
 
     reference_of: dict[int, int] = {}
@@ -52,7 +53,7 @@ def represent(
     for one in np.unique(cluster_of).tolist():
         inside = np.flatnonzero(cluster_of == one)
         poses = [matrix(sequences[clip_ids[i]]["feature"])[:, :POSE_COLUMNS] for i in inside]
-        scores = score_references(poses, distances=square[np.ix_(inside, inside)])
+        scores = score_references(poses, distances=weighted[np.ix_(inside, inside)])
         reference_of[one] = int(inside[scores.index])
         similarity[one] = float(scores.similarity[scores.index])
 

@@ -47,7 +47,7 @@ class Channels:
     foot_turn: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Posture:
     """A posed body over F frames.
 
