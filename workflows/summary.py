@@ -10,6 +10,7 @@ from motionary.catalog import Catalog
 from motionary.catalog.snapshot import OVERVIEW
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.linkages import linkages_by_distance
+from motionary.catalog.views.scores import score_columns, score_note, score_row
 from motionary.workflows.tables import text_table
 
 _MOST_CLUSTERS = 40
@@ -48,39 +49,11 @@ def clusters_shown(catalog: Catalog) -> Table:
 
 
 def cut_table(catalog: Catalog) -> Table:
-    """List every dendrogram's cut with its scores; the cut is found with the labels hidden."""
-    shown = [one.cut for one in linkages_by_distance(catalog)]
-    rows = [
-        [
-            f"{row['metric']}{' *' if row['primary'] else ''}",
-            row["method"],
-            f"{row['n_clusters']} ({row['rule']})",
-            _ratio(row["reward_punish"], row["reward_punish_best"]),
-            _number(row["ari"]),
-            _ratio(row["reward_punish_true"], row["reward_punish_best"]),
-            _number(row["ari_true"]),
-            _strip(row),
-        ]
-        for row in shown
-    ]
-    classes = shown[0]["classes"]
-    at = f"at {classes}" if classes else "at true"
-    columns = [
-        "distance",
-        "linkage",
-        "clusters",
-        "reward-punish",
-        "ARI",
-        f"r.-p. {at}",
-        f"ARI {at}",
-        "widest strip",
-    ]
-    published = next(row for row in shown if row["primary"])
-    title = (
-        f"Distances (cuts found with the labels hidden; * the published dendrogram, cut by "
-        f"{published['published_rule']} into {published['published_clusters']})"
+    """List a cut for each distance with its scores."""
+    cuts = [one.cut for one in linkages_by_distance(catalog)]
+    return text_table(
+        score_columns(cuts), [score_row(cut) for cut in cuts], f"Distances ({score_note(cuts)})"
     )
-    return text_table(columns, rows, title)
 
 
 def quarantine_table(catalog: Catalog) -> Table:
@@ -132,19 +105,5 @@ def _places(catalog: Catalog) -> str:
     )
 
 
-def _ratio(value: int | None, best: int | None) -> str:
-    return "-" if value is None or not best else f"{value} / {best}"
-
-
 def _purity(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
-
-
-def _strip(row: dict) -> str:
-    if row["strip_clusters"] is None:
-        return "-"
-    return f"{row['strip_clusters']}: {row['strip_low']:.4g} to {row['strip_high']:.4g}"

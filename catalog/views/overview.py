@@ -10,9 +10,9 @@ from motionary.catalog.query import Catalog
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.colours import cluster_character, cluster_colour
 from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES, dendrogram_figure
-from motionary.catalog.views.linkages import primary_linkage
 from motionary.catalog.views.mu_kappa import mu_kappa_figure
 from motionary.catalog.views.page import Cell, Html, details, facts, page, section, table
+from motionary.catalog.views.scores import score_columns, score_note, score_row
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -141,31 +141,14 @@ def _mu_kappa(figure: go.Figure | None) -> str:
 
 
 def _scores(catalog: Catalog) -> str:
-    primary = primary_linkage(catalog)
-    if primary is None:
+    cuts = catalog.cuts.to_arrow().to_pylist()
+    if not cuts:
         return ""
-    classes = primary.cut["classes"]
-    rows: list[list[Cell]] = [
-        [
-            ("* " if one["primary"] else "") + one["metric"],
-            one["method"],
-            f"{one['n_clusters']} ({one['rule']})",
-            _ratio(one["reward_punish"], one["reward_punish_best"]),
-            one["ari"],
-            _ratio(one["reward_punish_true"], one["reward_punish_best"]),
-            one["ari_true"],
-            _strip(one),
-        ]
-        for one in catalog.cuts.to_arrow().to_pylist()
-    ]
-    told = f"cut at {classes}" if classes else "cut at the number of labels"
-    columns = ["distance", "linkage", "clusters (rule)", "reward-punish", "ARI"]
+    note = score_note(cuts)
     return section(
         "Distances and linkages",
-        "Every cut here is found with the labels hidden, then scored against them. * marks the dendrogram "
-        f"whose clusters are published: {primary.cut['published_clusters']}, cut by "
-        f"{primary.cut['published_rule']}.",
-        table([*columns, f"reward-punish, {told}", f"ARI, {told}", "widest strip"], rows),
+        f"{note[0].upper()}{note[1:]}.",
+        table(score_columns(cuts), [score_row(cut) for cut in cuts]),
     )
 
 
@@ -186,16 +169,6 @@ def _quarantine(catalog: Catalog) -> str:
 def _mark(cluster_id: int) -> Html:
     colour = cluster_colour(cluster_id)
     return Html(f'<span style="color:{colour}" aria-hidden="true">{cluster_character(cluster_id)}</span>')
-
-
-def _ratio(value: int | None, best: int | None) -> str:
-    return "-" if value is None or not best else f"{value} / {best}"
-
-
-def _strip(cut: dict) -> str | None:
-    if cut["strip_clusters"] is None:
-        return None
-    return f"{cut['strip_clusters']}: {cut['strip_low']:.4g} to {cut['strip_high']:.4g}"
 
 
 def _plotly_script() -> str:
