@@ -87,7 +87,7 @@ class Skeleton:
         return {name: i for i, name in enumerate(self.names)}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """One take of motion capture.
 
@@ -145,6 +145,10 @@ class Motion:
             raise ValueError(f"motion {self.name!r} holds a quaternion of length zero")
         object.__setattr__(self, "root_position", root)
         object.__setattr__(self, "rotations", rotations / norms)
+
+    def __repr__(self) -> str:
+        joints = len(self.skeleton.names)
+        return f"<Motion {self.name!r}: {self.frames} frames at {self.fps:g} a second, {joints} joints>"
 
     @property
     def frames(self) -> int:

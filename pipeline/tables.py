@@ -188,8 +188,10 @@ TABLES: dict[str, pa.Schema] = {
             table_field("segment_length", pa.int32(), "L of CoTW", "frames at the common rate"),
             table_field("slack", pa.int32(), "delta of CoTW", "frames at the common rate"),
             table_field("objective", pa.float64(), "sum over segments and columns [CoTW eq. 5]"),
-            table_field("correlation_before", pa.float64(), "mean over the columns, length-matched only"),
-            table_field("correlation", pa.float64(), "mean over the columns, aligned"),
+            table_field(
+                "correlation_before", pa.float64(), "mean over 57 columns, still ones 0; length-matched"
+            ),
+            table_field("correlation", pa.float64(), "mean over 57 columns, still ones 0; aligned"),
             table_field("eta", pa.list_(pa.int32()), "stretch of each segment", "frames at the common rate"),
             table_field(
                 "source_time",

@@ -75,7 +75,7 @@ def test_a_run_with_quarantined_clips_exits_3(motionary, demo_library, tmp_path)
     (library / "good.bvh").write_bytes(good.read_bytes())
     code, out, _ = motionary("run", library, tmp_path / "out", "--workers", 1)
     assert code == 3
-    assert "1 clips, 1 quarantined" in out
+    assert "1 clip, 1 quarantined, 1 cluster\n" in out
     assert "bad.bvh" in out
 
 
@@ -185,3 +185,40 @@ def test_names_with_brackets_and_columns_of_one_name_are_shown(motionary, demo_c
     assert "[bold]x" in out
     assert "second" in out
     assert "third" in out
+
+
+def test_version(motionary):
+    code, out, _ = motionary("--version")
+    assert code == 0
+    assert out.strip().count(".") >= 1
+
+
+def test_a_folder_of_other_files_is_not_taken_for_a_catalog(motionary, demo_library):
+    code, out, err = motionary("run", demo_library, demo_library, "--workers", 1)
+    assert (code, out) == (1, "")
+    assert "is no catalog and holds other files (jump, kick, labels.csv); name a new folder" in err
+    assert not (demo_library / "tables").exists()
+
+
+def test_a_fault_inside_a_worker_is_one_line(demo_library, tmp_path):
+    command = [sys.executable, "-c", "from motionary.workflows.cli import main; main()", "run", demo_library]
+    done = subprocess.run(
+        [*command, "/proc/nowhere", "--workers", "2"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("motionary: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog):
+    command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' query {demo_catalog}"
+    shown = subprocess.run(
+        f"{command} 'select * from frames' --format csv | head -2",
+        shell=True, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert len(shown.stdout.splitlines()) == 2
+    assert shown.stderr == ""

@@ -80,7 +80,7 @@ def test_names_reach_the_unlabelled_clips(few, tmp_path, silent_progress):
     labels = few / "labels.csv"
     labels.write_text("\n".join(["path,action", *rows, "elsewhere/other.bvh,fly", f"{walks[-1]},"]))
     result = run(job(few, tmp_path / "out", labels=labels), silent_progress)
-    assert result.labels_outside == 1
+    assert result.labels_outside == ["elsewhere/other.bvh"]
     named = {row["clip_id"]: row for row in result.catalog.clusters.to_arrow().to_pylist()}
     assert [named[path]["label"] for path in walks] == ["stroll"] * 4
     assert [named[path]["label"] for path in squats] == ["crouch"] * 4

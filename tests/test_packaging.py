@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from motionary.catalog import Catalog
+from motionary.workflows.settings import load_settings
 from motionary.workflows.summary import print_summary
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -86,6 +87,14 @@ def test_the_catalogs_readme_shows_how_to_read_it_with_pandas_alone(demo_catalog
 
 def test_the_readmes_python_runs(demo_catalog):
     assert run_snippet("README.md", demo_catalog)["motion"].fps == 30
+
+
+def test_the_readmes_configuration_is_valid(tmp_path):
+    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
+    file = tmp_path / "motionary.toml"
+    file.write_text(text)
+    config = load_settings(file, {})
+    assert [one.name for one in config.features.conventions] == ["our-rig"]
 
 
 def test_the_readme_shows_what_the_demo_prints(demo_catalog):

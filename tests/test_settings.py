@@ -42,7 +42,7 @@ def test_a_users_convention(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[features]\nepsilom = 1\n", "features.epsilom"),
+        ("[features]\nepsilom = 1\n", "there is no setting features.epsilom"),
         ("[features]\nepsilon = -1\n", "epsilon is -1.0; it must be at least 0"),
         ("[features]\nkind = 'pose'\n", "features.kind"),
         ("[colours]\nred = 1\n", "colours"),
@@ -81,7 +81,7 @@ def test_labels_by_path_or_clip_id(tmp_path, library):
         {"clip_id": "a.bvh", "action": "walk", "mood": "NA"},
         {"clip_id": "sub/b.bvh", "action": "run", "mood": None},
     ]
-    assert made.outside == 2
+    assert made.outside == ["gone.bvh", "y"]
 
 
 @pytest.mark.parametrize(
@@ -94,6 +94,8 @@ def test_labels_by_path_or_clip_id(tmp_path, library):
         ),
         ("path,action\ntakes/a.bvh,x\ntakes/./a.bvh,y\n", "labels clip 'a.bvh' more than once, in rows 2, 3"),
         ("", "cannot be read as CSV"),
+        ("path;action\ntakes/a.bvh;x\n", "separated by semicolons"),
+        ("clip_id,action\na,x\n", "none of its 1 rows names a clip.*'a'.* is like 'a.bvh'"),
         ('path,action\n"takes/a.bvh,x\n', "cannot be read as CSV"),
     ],
 )

@@ -5,6 +5,7 @@ What computes is imported inside the commands, so that `--help` answers at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
@@ -16,6 +17,7 @@ from motionary.workflows.errors import UserError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from motionary.catalog import Catalog
     from motionary.pipeline.config import PipelineConfig
     from motionary.workflows.main_job import RunResult
 
@@ -23,7 +25,6 @@ FAILED, QUARANTINED = 1, 3
 
 app = typer.Typer(
     name="motionary",
-    help="A dictionary of motion: cluster, name and align a library of motion capture.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -41,6 +42,23 @@ Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine.", show_default="one a core")
 ]
 Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(version("motionary"))
+        raise typer.Exit
+
+
+@app.callback()
+def motionary(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Cluster, name and align a library of motion capture: a dictionary of motion."""
 
 
 @app.command()
@@ -118,8 +136,8 @@ def demo(
     log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
     _run([library], str(catalog), _settings(None, {}), library / "labels.csv", workers, None)
     print(f"\nNext:\n  open {catalog / 'overview.html'} in a browser")
-    print(f'  motionary query {catalog} "select label, count(*) as clips from clusters group by label"')
-    print(f"  motionary status {catalog}")
+    print(f'  {_program()} query {catalog} "select label, count(*) as clips from clusters group by label"')
+    print(f"  {_program()} status {catalog}")
 
 
 @app.command()
@@ -169,6 +187,9 @@ def main() -> NoReturn:
     """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
     try:
         app(prog_name="motionary")
+    except BrokenPipeError:  # the reader has seen enough; nothing more may be written, at exit neither
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115
+        sys.exit(FAILED)
     except (UserError, OSError) as error:
         _fail(str(error))
     except Exception as error:
@@ -204,15 +225,18 @@ def _run(
         result = run(job, partial(progress, console=log))
     except KeyboardInterrupt:
         _fail("interrupted; the published catalog is as it was, and the same command resumes")
-    _explain(result, log)
+    _explain(result, labels is not None, log)
     print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
         raise typer.Exit(QUARANTINED)
 
 
-def _explain(result: RunResult, log: Console) -> None:
+def _explain(result: RunResult, has_labels: bool, log: Console) -> None:
     if result.labels_outside:
-        log.print(f"passed over {result.labels_outside} labels of files outside the library", highlight=False)
+        count, first = len(result.labels_outside), result.labels_outside[0]
+        log.print(f"passed over {count} labels of files outside the library ({first}, ...)", highlight=False)
+    if not has_labels:
+        log.print("clusters have no names without labels: --labels CSV", highlight=False)
     if result.reused:
         total = result.computed + result.reused
         log.print(f"{result.reused} of {total} results were there already", highlight=False)
@@ -224,7 +248,14 @@ def _settings(file: Path | None, options: dict[str, dict[str, Any]]) -> Pipeline
     return load_settings(file, options)
 
 
-def _open(url: str) -> Any:
+def _program() -> str:
+    """Name this program so that the line can be typed again here."""
+    import shutil
+
+    return "motionary" if shutil.which("motionary") else os.path.relpath(sys.argv[0])
+
+
+def _open(url: str) -> Catalog:
     from motionary.catalog import Catalog
 
     return Catalog.open(url)

@@ -1,7 +1,7 @@
 """Labels that people supply with a library: a CSV, a row a clip.
 
 A row names its clip by `path`, relative to the CSV's own folder, or by `clip_id`; `path` wins. All other
-columns are labels. Rows for files outside the library are counted and passed over.
+columns are labels. Rows for files outside the library are counted and passed over, but not all of them.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ class SuppliedLabels:
     ----------
     table : pyarrow.Table
         clip_id and a text column a label; no value where the CSV has none.
-    outside : int
-        Rows of the CSV for files that are not in the library.
+    outside : list of str
+        What the CSV names that is not in the library.
     """
 
     table: pa.Table
-    outside: int
+    outside: list[str]
 
 
-NO_LABELS = SuppliedLabels(pa.table({"clip_id": pa.array([], pa.string())}), 0)
+NO_LABELS = SuppliedLabels(pa.table({"clip_id": pa.array([], pa.string())}), [])
 
 
 def read_labels(file: Path, sources: Sequence[Source], label_column: str) -> SuppliedLabels:
@@ -56,11 +56,13 @@ def read_labels(file: Path, sources: Sequence[Source], label_column: str) -> Sup
     Raises
     ------
     LabelsError
-        The file is missing or no CSV, has neither `path` nor `clip_id`, lacks the label column, or labels
-        one clip twice.
+        The file is missing or no CSV, has neither `path` nor `clip_id`, lacks the label column, labels one
+        clip twice, or names no clip of the library.
     """
     rows = _read_csv(file)
     names = list(rows.columns)
+    if len(names) == 1 and ";" in names[0]:
+        raise LabelsError(f"{file} is separated by semicolons; save it with commas")
     if not {"path", "clip_id"} & set(names):
         raise LabelsError(
             f"{file} has no column path or clip_id to tell the clips by; it has {', '.join(names)}"
@@ -70,7 +72,15 @@ def read_labels(file: Path, sources: Sequence[Source], label_column: str) -> Sup
             f"{file} has no column {label_column!r}; "
             f"name one of its columns with --label-column: {', '.join(names)}"
         )
-    rows["clip_id"] = _clip_ids(rows, file, sources)
+    clip_ids = _clip_ids(rows, file, sources)
+    outside = [name for name, clip_id in zip(_names(rows), clip_ids, strict=True) if clip_id is None]
+    if len(outside) == len(rows):
+        raise LabelsError(
+            f"{file}: none of its {len(rows)} rows names a clip of the library (the first is {outside[:1]}); "
+            f"a path is relative to {file.parent}, and a clip_id, with its suffix, is like "
+            f"{sources[0].clip_id!r}"
+        )
+    rows["clip_id"] = clip_ids
     inside = rows[rows["clip_id"].notna()].drop(columns="path", errors="ignore")
     twice = inside[inside["clip_id"].duplicated(keep=False)]
     if len(twice):
@@ -78,7 +88,7 @@ def read_labels(file: Path, sources: Sequence[Source], label_column: str) -> Sup
         lines = ", ".join(str(line + 2) for line in twice.index[twice["clip_id"] == clip_id])
         raise LabelsError(f"{file} labels clip {clip_id!r} more than once, in rows {lines}; keep one")
     columns = {name: pa.array(inside[name].to_list(), pa.string()) for name in inside.columns}
-    return SuppliedLabels(pa.table(columns), len(rows) - len(inside))
+    return SuppliedLabels(pa.table(columns), outside)
 
 
 def _read_csv(file: Path) -> pd.DataFrame:
@@ -105,7 +115,15 @@ def _clip_ids(rows: pd.DataFrame, file: Path, sources: Sequence[Source]) -> list
             return by_path.get(os.path.realpath(folder / path))
         return name if name in known else None
 
-    missing = [None] * len(rows)
-    paths = rows["path"] if "path" in rows else missing
-    names = rows["clip_id"] if "clip_id" in rows else missing
-    return [clip_id(path, name) for path, name in zip(paths, names, strict=True)]
+    pairs = zip(_column(rows, "path"), _column(rows, "clip_id"), strict=True)
+    return [clip_id(path, name) for path, name in pairs]
+
+
+def _names(rows: pd.DataFrame) -> list[str]:
+    """Return what each row calls its clip."""
+    pairs = zip(_column(rows, "path"), _column(rows, "clip_id"), strict=True)
+    return [path or name or "" for path, name in pairs]
+
+
+def _column(rows: pd.DataFrame, name: str) -> list[str | None]:
+    return rows[name].to_list() if name in rows else [None] * len(rows)

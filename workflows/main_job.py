@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import posixpath
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -16,7 +17,14 @@ import pyarrow as pa
 
 from motionary.catalog import Catalog
 from motionary.catalog.schema import PUBLISHED, SCHEMAS
-from motionary.catalog.snapshot import OVERVIEW, Snapshot, current_snapshot, next_snapshot_id, publish
+from motionary.catalog.snapshot import (
+    CURRENT,
+    OVERVIEW,
+    Snapshot,
+    current_snapshot,
+    next_snapshot_id,
+    publish,
+)
 from motionary.catalog.store import Store
 from motionary.catalog.views.overview import overview_page
 from motionary.pipeline.config import PipelineConfig
@@ -63,14 +71,14 @@ class RunResult:
     ----------
     catalog : Catalog
         Opened at the snapshot that the run published.
-    labels_outside : int
-        Rows of the labels file for files outside the library.
+    labels_outside : list of str
+        What the labels file names that is not in the library.
     computed, reused : int
         Tasks that had something to do, and those whose result was there already.
     """
 
     catalog: Catalog
-    labels_outside: int
+    labels_outside: list[str]
     computed: int
     reused: int
 
@@ -92,8 +100,8 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
     Raises
     ------
     UserError
-        The library is missing or holds no clip or too few, the labels file cannot be used, or the scheduler
-        cannot be reached.
+        The library is missing or holds no clip or too few, the labels file cannot be used, the catalog's
+        folder holds something else, or the scheduler cannot be reached.
     """
     started = datetime.now(UTC)
     roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
@@ -105,6 +113,7 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
     labels = read_labels(job.labels, sources, column) if job.labels else NO_LABELS
 
     store = Store(absolute(job.catalog))
+    _claim(store)
     tasks = build_graph(sources, labels.table, job.config, store)
     with show_progress(Counter(task.stage for task in tasks)) as done:
         reports = compute(tasks, job.workers, job.scheduler, done)
@@ -131,6 +140,23 @@ def library_sources(roots: Sequence[str]) -> list[Source]:
 def absolute(url: str) -> str:
     """Return a catalog's URL such that workers find it from any folder."""
     return url if "://" in url else os.path.abspath(url)  # noqa: PTH100 - Path.resolve would follow links
+
+
+def _claim(store: Store) -> None:
+    """Make the catalog's folder; one that holds something else is not taken over.
+
+    Raises
+    ------
+    UserError
+        It is a folder of other files.
+    OSError
+        It cannot be written.
+    """
+    names = {posixpath.basename(path.rstrip("/")) for path in store.names("")}
+    if names and not names & {CURRENT, "tables"}:
+        some = ", ".join(sorted(names)[:3])
+        raise UserError(f"{store.url} is no catalog and holds other files ({some}); name a new folder")
+    store.filesystem.makedirs(store.path("tables"), exist_ok=True)
 
 
 def _publish(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -42,8 +44,6 @@ def compute(
     SchedulerError
         Nothing answers at `address`.
     """
-    # What a task raises is raised here as well; the worker's own account of it would only repeat it.
-    logging.getLogger("distributed.worker").setLevel(logging.CRITICAL)
     with _client(workers, address) as client:
         graph = {task.node.key: task.node for task in tasks}
         futures = client.get(graph, list(graph), sync=False)
@@ -62,13 +62,26 @@ def _client(workers: int, address: str | None) -> Iterator[Client]:
         with client:
             yield client
         return
-    with (
-        LocalCluster(
+    with _interrupts_ignored():
+        cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=workers > 1,
             dashboard_address="127.0.0.1:0",  # a free port, and nothing for the network to see
-        ) as cluster,
-        Client(cluster) as client,
-    ):
+            silence_logs=logging.CRITICAL,  # what a task raises is raised here as well
+        )
+    with cluster, Client(cluster) as client:
         yield client
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """Let processes that start meanwhile ignore Ctrl-C: this one hears it, and ends them in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

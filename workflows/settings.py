@@ -103,4 +103,6 @@ def _fields(config: FeatureConfig) -> dict[str, Any]:
 
 def _explained(error: Any) -> str:
     place = ".".join(map(str, error["loc"]))
+    if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        return f"there is no setting {place}"
     return f"setting {place}: {error['msg'].removeprefix('Value error, ')}"

@@ -19,7 +19,8 @@ _MOST_CLUSTERS = 40
 def print_summary(catalog: Catalog, console: Console) -> None:
     """Print a catalog's clips, clusters, scores, times and place."""
     run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
-    console.print(f"{run['clips']} clips, {run['quarantined']} quarantined, {run['clusters']} clusters")
+    clips, clusters = counted(run["clips"], "clip"), counted(run["clusters"], "cluster")
+    console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
     parts: list[RenderableType] = []
     if run["quarantined"]:
         parts += ["", quarantine_table(catalog)]
@@ -107,3 +108,8 @@ def _places(catalog: Catalog) -> str:
 
 def _purity(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Say how many."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Sequence
 from typing import Literal
@@ -21,7 +22,8 @@ _WIDE = 200  # columns of a table that goes to a file or a pipe
 
 def output_console() -> Console:
     """Return a console on stdout that does not cut lines where nobody looks at them."""
-    return Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+    fits = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(width=None if fits else _WIDE, highlight=False, soft_wrap=False)
 
 
 def write_table(table: pa.Table, format_: Format) -> None:
@@ -32,7 +34,7 @@ def write_table(table: pa.Table, format_: Format) -> None:
     table : pyarrow.Table
         The answer.
     format_ : {"table", "json", "csv", "parquet"}
-        json is one list of objects; csv writes nested values as JSON text.
+        json is one list of objects; csv writes nested values as JSON text; table shortens them.
     """
     sink = sys.stdout.buffer
     if format_ == "json":
@@ -74,6 +76,8 @@ def _shown(value: object) -> str:
         return ""
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, dict):
+        return f"{{{', '.join(value)}}}"
     if isinstance(value, list) and len(value) > 8:
         return f"[{', '.join(_shown(one) for one in value[:4])}, … {len(value)} values]"
     return str(value)

@@ -183,5 +183,6 @@ def _chart(figure: go.Figure, name: str) -> str:
         include_plotlyjs=False,
         include_mathjax=False,
         div_id=name,
-        config={"displaylogo": False, "responsive": True},
+        # Without the button that would upload the chart, and the names of its clips, to a server.
+        config={"displaylogo": False, "responsive": True, "showSendToCloud": False},
     )
