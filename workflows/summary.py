@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from rich.console import Console, Group, RenderableType
 from rich.markup import escape
-from rich.table import Table
 
 from motionary.catalog import Catalog
 from motionary.catalog.snapshot import OVERVIEW
@@ -30,7 +29,7 @@ def print_summary(catalog: Catalog, console: Console) -> None:
     console.print(Group(*parts))
 
 
-def clusters_shown(catalog: Catalog) -> Table:
+def clusters_shown(catalog: Catalog) -> RenderableType:
     """List the published clusters: size, name, purity where labels are known, reference."""
     clusters = cluster_table(catalog).to_pylist()
     rows = [
@@ -49,7 +48,7 @@ def clusters_shown(catalog: Catalog) -> Table:
     return text_table(["cluster", "clips", "name", "purity", "reference"], rows, title)
 
 
-def cut_table(catalog: Catalog) -> Table:
+def cut_table(catalog: Catalog) -> RenderableType:
     """List a cut for each distance with its scores."""
     cuts = [one.cut for one in linkages_by_distance(catalog)]
     return text_table(
@@ -57,7 +56,7 @@ def cut_table(catalog: Catalog) -> Table:
     )
 
 
-def quarantine_table(catalog: Catalog) -> Table:
+def quarantine_table(catalog: Catalog) -> RenderableType:
     """List the files that could not be read."""
     rows = [
         [row["path"], str(row["line"] or ""), row["reason"], row["mend"]]

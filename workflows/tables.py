@@ -11,7 +11,7 @@ from typing import Literal
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -49,15 +49,18 @@ def write_table(table: pa.Table, format_: Format) -> None:
         output_console().print(text_table(table.column_names, list(zip(*columns, strict=True))))
 
 
-def text_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> Table:
+def text_table(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None
+) -> RenderableType:
     """Lay text out in columns; those that hold only numbers stand to the right."""
-    made = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    made = Table(box=None, pad_edge=False, header_style="bold")
     for index, name in enumerate(columns):
         numeric = bool(rows) and all(_is_number(row[index]) for row in rows)
         made.add_column(Text(name), justify="right" if numeric else "left", overflow="fold")
     for row in rows:
         made.add_row(*map(Text, row))  # not markup: a name may hold brackets
-    return made
+    # Above the table and not as its title, which would be folded to the table's width.
+    return Group(Text(title), made) if title else made
 
 
 def _flat(table: pa.Table) -> pa.Table:
