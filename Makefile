@@ -5,16 +5,19 @@ PYTHON ?= $(shell for one in python3 python3.13 python3.12 python3.11; do \
 	$$one -c '$(FITS)' 2>/dev/null && echo $$one && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
+# The peers of the benchmarks: what they pin would drag down what we stand on.
+PEERS := .venv-peers
 SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed')
 
-.PHONY: help demo test test-all lint clean
+.PHONY: help demo test test-all bench lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
 	@echo "make test      run the tests, without those marked slow"
 	@echo "make test-all  run all tests"
+	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn"
 	@echo "make lint      check style, types and the direction of imports"
-	@echo "make clean     remove the environment and what the targets made"
+	@echo "make clean     remove the environments and what the targets made"
 
 demo: $(VENV)/installed
 	@echo "== The main job on the embedded library of made-up motions, in motionary-demo/"
@@ -28,6 +31,10 @@ test-all: $(VENV)/installed
 	@echo "== All tests"
 	$(BIN)/python -m pytest
 
+bench: $(VENV)/installed $(PEERS)/environment
+	@echo "== The distances beside dtaidistance, aeon and tslearn: some minutes, best on a quiet machine"
+	$(BIN)/python -m tests.benchmarks --peers $(PEERS)/bin/python --json motionary-bench/bench.json
+
 lint: $(VENV)/installed
 	@echo "== Style, types, direction of imports"
 	$(BIN)/ruff check .
@@ -36,7 +43,7 @@ lint: $(VENV)/installed
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) build motionary-demo .hypothesis .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(PEERS) build motionary-demo motionary-bench .hypothesis .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name '*.egg-info' -o -name __pycache__ | xargs rm -rf
 
 $(VENV)/environment: constraints.txt pyproject.toml
@@ -45,6 +52,14 @@ $(VENV)/environment: constraints.txt pyproject.toml
 	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt pip setuptools wheel
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt ".[test,lint]"
+	@touch $@
+
+$(PEERS)/environment: tests/benchmarks/constraints.txt
+	@test -n "$(PYTHON)" || { echo "motionary needs Python 3.11 to 3.13; name one: make PYTHON=python3.12" >&2; exit 1; }
+	@echo "== Making the peers' environment $(PEERS)"
+	$(PYTHON) -m venv --clear $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c tests/benchmarks/constraints.txt \
+		aeon dtaidistance tslearn
 	@touch $@
 
 # Installed as users have it, not in editable mode: a forgotten subpackage shows. The old installation goes

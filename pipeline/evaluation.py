@@ -1,4 +1,4 @@
-"""How well clusters and distances agree with known classes.
+"""How well clusters agree with known classes; `retrieval.py` asks the same of distances.
 
 Throughout, `clusters` and `classes` hold one hashable value a clip, and a clip whose class is missing (None,
 or a missing value of pandas) is left out.
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Values = Sequence[Hashable | None] | NDArray[Any]
 
@@ -73,7 +73,7 @@ def best_reward_punish(classes: Values) -> int:
     int
         Sum of n (n - 1) over classes of n clips.
     """
-    codes = _codes(classes)
+    codes = codes_of(classes)
     size = np.bincount(codes[codes >= 0])
     return int((size * (size - 1)).sum())
 
@@ -96,11 +96,48 @@ def adjusted_rand_index(clusters: Values, classes: Values) -> float:
     ValueError
         Lengths differ, a clip has no cluster, or no clip has a class.
     """
-    from sklearn.metrics import adjusted_rand_score
+    count = _contingency(clusters, classes)
+    _some(count.clips)
+    # Ordered pairs of different clips: together in both, in clusters alone, in classes alone, in neither.
+    clips = int(count.clips.sum())
+    both = int((count.clips**2).sum()) - clips
+    cluster_alone = int((count.cluster_sizes**2).sum()) - clips - both
+    class_alone = int((count.class_sizes**2).sum()) - clips - both
+    neither = clips * (clips - 1) - both - cluster_alone - class_alone
+    if cluster_alone == class_alone == 0:
+        return 1.0
+    in_classes, in_clusters = both + class_alone, both + cluster_alone
+    scale = in_classes * (class_alone + neither) + in_clusters * (cluster_alone + neither)
+    return 2 * (both * neither - cluster_alone * class_alone) / scale
 
-    cluster_codes, class_codes = _classed(clusters, classes)
-    _some(class_codes)
-    return float(adjusted_rand_score(class_codes, cluster_codes))
+
+def normalised_mutual_information(clusters: Values, classes: Values) -> float:
+    """Return what clusters and classes tell of each other, over the mean of their entropies.
+
+    Over the arithmetic mean; the rival conventions divide by the greater or the geometric mean.
+
+    Parameters
+    ----------
+    clusters, classes : sequence (N,)
+        Cluster and class of every clip.
+
+    Returns
+    -------
+    float
+        0 to 1. Not adjusted for chance: many small clusters score above 0.
+
+    Raises
+    ------
+    ValueError
+        Lengths differ, a clip has no cluster, or no clip has a class.
+    """
+    count = _contingency(clusters, classes)
+    _some(count.clips)
+    entropies = _entropy(count.cluster_sizes) + _entropy(count.class_sizes)
+    if entropies == 0:
+        return 1.0
+    shared = entropies - _entropy(count.clips)
+    return max(0.0, 2 * shared / entropies)
 
 
 def purity(clusters: Values, classes: Values) -> Purity:
@@ -133,50 +170,6 @@ def purity(clusters: Values, classes: Values) -> Purity:
     )
 
 
-def nearest_neighbour_accuracy(
-    square_distances: ArrayLike, classes: Values, groups: Values | None = None
-) -> float:
-    """Return how often a clip's nearest other clip is of its class.
-
-    Parameters
-    ----------
-    square_distances : array (N, N)
-        Distance of every two clips; the diagonal is not read.
-    classes : sequence (N,)
-        Class of every clip. Clips without one neither ask nor answer.
-    groups : sequence (N,), optional
-        Where each clip comes from, its data set for example. Then only clips of other groups are neighbours.
-
-    Returns
-    -------
-    float
-        0 to 1, over the clips that have a neighbour at all. Of equally near neighbours the first counts.
-
-    Raises
-    ------
-    ValueError
-        Shapes disagree, a clip has no group, a distance is not a number, or no clip has a neighbour.
-    """
-    distances = np.asarray(square_distances, dtype=np.float64)
-    codes = _codes(classes)
-    if distances.shape != (len(codes), len(codes)):
-        raise ValueError(
-            f"square_distances has shape {distances.shape}; {len(codes)} classes need that many a side"
-        )
-    group_codes = np.arange(len(codes)) if groups is None else _complete_codes("group", groups, len(codes))
-    classed = codes >= 0
-    allowed = classed[:, None] & classed[None, :] & (group_codes[:, None] != group_codes[None, :])
-    if np.isnan(distances[allowed]).any():
-        raise ValueError("square_distances holds a value that is not a number")
-    asking = np.flatnonzero(allowed.any(axis=1))
-    if not asking.size:
-        raise ValueError(
-            "no clip with a class has a neighbour with a class (in another group, where groups are given)"
-        )
-    nearest = np.where(allowed, distances, np.inf)[asking].argmin(axis=1)
-    return float((codes[nearest] == codes[asking]).mean())
-
-
 @dataclass(frozen=True)
 class _Contingency:
     """Clips with a class, counted by cluster and class; only cells that hold some."""
@@ -184,24 +177,33 @@ class _Contingency:
     cluster_of_cell: NDArray[np.int64]
     clips: NDArray[np.int64]
     cluster_sizes: NDArray[np.int64]
+    class_sizes: NDArray[np.int64]
 
 
 def _contingency(clusters: Values, classes: Values) -> _Contingency:
     cluster_codes, class_codes = _classed(clusters, classes)
-    cells, clips = np.unique(np.stack([cluster_codes, class_codes]), axis=1, return_counts=True)
-    return _Contingency(cells[0], clips, np.bincount(cluster_codes))
+    width = class_codes.max(initial=0) + 1
+    cells, clips = np.unique(cluster_codes * width + class_codes, return_counts=True)
+    return _Contingency(cells // width, clips, np.bincount(cluster_codes), np.bincount(class_codes))
+
+
+def _entropy(sizes: NDArray[np.int64]) -> float:
+    """Entropy, in nats, of what a clip drawn at random belongs to."""
+    share = sizes[sizes > 0] / sizes.sum()
+    return float(-(share * np.log(share)).sum())
 
 
 def _classed(clusters: Values, classes: Values) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the codes of clusters and of classes, for the clips that have a class."""
-    class_codes = _codes(classes)
-    cluster_codes = _complete_codes("cluster", clusters, len(class_codes))
+    class_codes = codes_of(classes)
+    cluster_codes = codes_of_all("cluster", clusters, len(class_codes))
     classed = class_codes >= 0
     return cluster_codes[classed], class_codes[classed]
 
 
-def _complete_codes(what: str, values: Values, clips: int) -> NDArray[np.int64]:
-    codes = _codes(values)
+def codes_of_all(what: str, values: Values, clips: int) -> NDArray[np.int64]:
+    """Return a number for each of the values of `clips` clips, none of which may be missing."""
+    codes = codes_of(values)
     if len(codes) != clips:
         raise ValueError(
             f"{len(codes)} clips have a {what} and {clips} a class; both sequences must be of the same clips"
@@ -211,7 +213,7 @@ def _complete_codes(what: str, values: Values, clips: int) -> NDArray[np.int64]:
     return codes
 
 
-def _codes(values: Values) -> NDArray[np.int64]:
+def codes_of(values: Values) -> NDArray[np.int64]:
     """Return a number for each value, in order of appearance; -1 where missing."""
     return pd.factorize(_objects(values))[0]
 

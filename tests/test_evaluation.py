@@ -5,14 +5,16 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.metrics import adjusted_rand_score, average_precision_score, normalized_mutual_info_score
 
 from motionary.pipeline.evaluation import (
     adjusted_rand_index,
     best_reward_punish,
-    nearest_neighbour_accuracy,
+    normalised_mutual_information,
     purity,
     reward_punish,
 )
+from motionary.pipeline.retrieval import mean_average_precision, nearest_neighbour_accuracy
 
 # The paper's motions: basketball, soccer, boxing, jumping, running, walking.
 PAPER_CLASSES = np.repeat(np.arange(6), (11, 6, 7, 17, 20, 19))
@@ -69,6 +71,49 @@ def test_adjusted_rand_index_of_a_worked_example():
     )
 
 
+@settings(max_examples=200, deadline=None)
+@given(clips.filter(lambda clips: any(kind is not None for _, kind in clips)))
+def test_indices_are_scikit_learns(clips):
+    clusters, classes = [c for c, _ in clips], [k for _, k in clips]
+    held = [(c, k) for c, k in clips if k is not None]
+    known, found = [k for _, k in held], [c for c, _ in held]
+    assert adjusted_rand_index(clusters, classes) == pytest.approx(
+        adjusted_rand_score(known, found), abs=1e-12
+    )
+    information = normalised_mutual_information(clusters, classes)
+    assert information == pytest.approx(normalized_mutual_info_score(known, found), abs=1e-7)
+    assert 0 <= information <= 1 + 1e-12
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(2, 9), st.integers(0, 2**32 - 1), st.integers(1, 20))
+def test_average_precision_is_scikit_learns(count, seed, levels):
+    rng = np.random.default_rng(seed)
+    square = rng.integers(0, levels, (count, count)) / 4.0
+    square += square.T
+    classes = rng.choice(["a", "b", None], count, p=[0.5, 0.3, 0.2]).tolist()
+    precisions = []
+    for clip, kind in enumerate(classes):
+        others = [o for o in range(count) if o != clip and classes[o] is not None]
+        same = [classes[o] == kind for o in others]
+        if kind is not None and any(same):
+            precisions.append(average_precision_score(same, -square[clip, others]))
+    if precisions:
+        assert mean_average_precision(square, classes) == pytest.approx(np.mean(precisions))
+    else:
+        with pytest.raises(ValueError, match="no class has two clips"):
+            mean_average_precision(square, classes)
+
+
+def test_average_precision_of_a_worked_example():
+    place = np.array([0.0, 1.0, 3.0, 7.0])
+    # The classes of the others, nearest first: b a b, a a b, b a b, a b a.
+    distances = abs(place[:, None] - place)
+    assert mean_average_precision(distances, ["a", "b", "a", "b"]) == pytest.approx(
+        np.mean([1 / 2, 1 / 3, 1 / 2, 1 / 2])
+    )
+
+
 def test_clips_without_class_are_left_out():
     clusters, classes = [0, 0, 1, 1, 0, 2], ["a", "a", "b", "b", None, None]
     assert adjusted_rand_index(clusters, classes) == 1.0
@@ -116,5 +161,10 @@ def test_wrong_input_is_refused():
         adjusted_rand_index([0, 1], [None, None])
     with pytest.raises(ValueError, match=r"shape \(2, 2\)"):
         nearest_neighbour_accuracy(np.ones((2, 2)), ["a"])
-    with pytest.raises(ValueError, match="not a number"):
-        nearest_neighbour_accuracy(np.full((2, 2), np.nan), ["a", "a"])
+    for measure in (nearest_neighbour_accuracy, mean_average_precision):
+        with pytest.raises(ValueError, match="not a number"):
+            measure(np.full((2, 2), np.nan), ["a", "a"])
+    with pytest.raises(ValueError, match=r"shape \(2, 3\)"):
+        mean_average_precision(np.ones((2, 3)), ["a", "a"])
+    with pytest.raises(ValueError, match="no clip has a class"):
+        normalised_mutual_information([0, 1], [None, None])

@@ -12,14 +12,16 @@ from motionary.pipeline.distances import PairwiseDistances, pairwise_distances
 from motionary.pipeline.evaluation import (
     adjusted_rand_index,
     best_reward_punish,
-    nearest_neighbour_accuracy,
     reward_punish,
 )
 from motionary.pipeline.features import motion_features
 from motionary.pipeline.readers import read_motion
 from motionary.pipeline.readers.library import scan_library
+from motionary.pipeline.retrieval import nearest_neighbour_accuracy
 from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.workflows.main_job import Job, run
+from motionary.workflows.reproduce.combinations import pairs_among
+from motionary.workflows.reproduce.draws import draw
 
 DRAWS = 100
 
@@ -49,27 +51,16 @@ def hdm05(shared_data) -> tuple[np.ndarray, dict[str, PairwiseDistances]]:
     return classes, {kind: pairwise_distances(features[kind]) for kind in kinds}
 
 
-def drawn(classes: np.ndarray, seed: int) -> np.ndarray:
-    """Draw 6 to 20 clips of every class."""
-    rng = np.random.default_rng(seed)
-    members = [np.flatnonzero(classes == one) for one in np.unique(classes)]
-    sizes = [min(int(rng.integers(6, 21)), len(one)) for one in members]
-    return np.sort(
-        np.concatenate([rng.choice(m, n, replace=False) for m, n in zip(members, sizes, strict=True)])
-    )
-
-
 def test_on_draws_of_hdm05_the_curve_beats_dtw_and_the_default_beats_the_paper(hdm05):
     classes, distances = hdm05
     paper, default = distances["paper"], distances["pose+travel"]
     rows = []
-    for seed in range(DRAWS):
-        chosen = drawn(classes, seed)
-        known, kappa = classes[chosen], len(np.unique(classes))
+    for number in range(DRAWS):
+        chosen = draw(classes, "6-20", 0, number)
+        known, kappa, pairs = classes[chosen], len(np.unique(classes)), pairs_among(chosen, len(classes))
 
-        def clusters(linkage, distance, chosen=chosen, kappa=kappa):
-            part = squareform(squareform(distance)[np.ix_(chosen, chosen)], checks=False)
-            return cut_tree(linkage(part), n_clusters=kappa)
+        def clusters(linkage, distance, pairs=pairs, kappa=kappa):
+            return cut_tree(linkage(distance[pairs]), n_clusters=kappa)
 
         by_dtw, by_curve = clusters(complete_linkage, paper.dtw), clusters(complete_linkage, paper.weighted)
         best = best_reward_punish(known)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 FAILED, QUARANTINED = 1, 3
 
+_COMPILING = "compiling the kernels: once on a machine, some twenty seconds"
+
 app = typer.Typer(
     name="motionary",
     no_args_is_help=True,
@@ -183,6 +185,39 @@ def graph(
     print(f"wrote {out}")
 
 
+@app.command()
+def reproduce(
+    name: Annotated[
+        Literal["dtw-curve", "dtw-curve-better"],
+        typer.Argument(metavar="NAME", help="dtw-curve or dtw-curve-better."),
+    ],
+    catalog: CatalogUrl,
+    draws: Annotated[int, typer.Option("--draws", min=1, help="Sets of clips drawn by each rule.")] = 100,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
+    label_column: Annotated[
+        str, typer.Option("--label-column", help="Column that holds the classes.")
+    ] = "action",
+    format_: OutputFormat = "table",
+) -> None:
+    """Repeat a paper's experiment on the labelled clips of CATALOG.
+
+    dtw-curve: which distance, linkage and features find the classes. dtw-curve-better: changes to the
+    default.
+    """
+    from functools import partial
+
+    from motionary.workflows.progress import progress
+    from motionary.workflows.reproduce import EXPERIMENTS
+    from motionary.workflows.tables import output_console, write_table
+
+    conduct, report = EXPERIMENTS[name]
+    experiment = conduct(_open(catalog), label_column, draws, seed, partial(progress, console=_stderr()))
+    if format_ == "table":
+        output_console().print(report(experiment))
+    else:
+        write_table(experiment.study.to_arrow(), format_)
+
+
 def main() -> NoReturn:
     """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
     try:
@@ -211,18 +246,17 @@ def _run(
 ) -> None:
     from functools import partial
 
-    from motionary.pipeline.distances.pairwise import usable_processors
+    from dask.system import CPU_COUNT
+
     from motionary.workflows.main_job import Job, run
     from motionary.workflows.progress import progress
     from motionary.workflows.summary import print_summary
     from motionary.workflows.tables import output_console
 
-    job = Job(
-        [str(one) for one in libraries], catalog, config, labels, workers or usable_processors(), scheduler
-    )
+    job = Job([str(one) for one in libraries], catalog, config, labels, workers or CPU_COUNT, scheduler)
     log = _stderr()
     try:
-        result = run(job, partial(progress, console=log))
+        result = run(job, partial(progress, console=log), partial(log.print, _COMPILING, highlight=False))
     except KeyboardInterrupt:
         _fail("interrupted; the published catalog is as it was, and the same command resumes")
     _explain(result, labels is not None, log)

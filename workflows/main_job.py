@@ -86,7 +86,7 @@ class RunResult:
 ShowProgress = Callable[[Counter], AbstractContextManager[Callable[[str], None]]]
 
 
-def run(job: Job, show_progress: ShowProgress) -> RunResult:
+def run(job: Job, show_progress: ShowProgress, compiling: Callable[[], object] = lambda: None) -> RunResult:
     """Ingest, compare, cluster, name and align a library, then publish the result in one step.
 
     Parameters
@@ -96,12 +96,14 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
     show_progress : callable
         Given the number of tasks by stage, a context whose value is called with the stage of every finished
         task; see `motionary.workflows.progress`.
+    compiling : callable
+        Called if the kernels must be compiled first; that takes some twenty seconds, once on a machine.
 
     Raises
     ------
     UserError
         The library is missing or holds no clip or too few, the labels file cannot be used, the catalog's
-        folder holds something else, or the scheduler cannot be reached.
+        folder holds something else, the scheduler cannot be reached, or compiled kernels cannot be kept.
     """
     started = datetime.now(UTC)
     roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
@@ -116,7 +118,9 @@ def run(job: Job, show_progress: ShowProgress) -> RunResult:
     _claim(store)
     tasks = build_graph(sources, labels.table, job.config, store)
     with show_progress(Counter(task.stage for task in tasks)) as done:
-        reports = compute(tasks, job.workers, job.scheduler, done)
+        reports = compute(
+            tasks, job.workers, job.scheduler, done, None if _all_stored(store, tasks) else compiling
+        )
 
     catalog = _publish(store, tasks, reports, job, roots, started)
     computed = sum(report.computed for report in reports)
@@ -157,6 +161,19 @@ def _claim(store: Store) -> None:
         some = ", ".join(sorted(names)[:3])
         raise UserError(f"{store.url} is no catalog and holds other files ({some}); name a new folder")
     store.filesystem.makedirs(store.path("tables"), exist_ok=True)
+
+
+def _all_stored(store: Store, tasks: Sequence[Task]) -> bool:
+    """Say whether no task has anything to compute, from one listing a table."""
+    stored = {
+        table: {posixpath.basename(path) for path in store.names(f"tables/{table}")}
+        for table in {table for task in tasks for table in task.makes}
+    }
+    return all(
+        posixpath.basename(store.part_name(table, task.key)) in stored[table]
+        for task in tasks
+        for table in task.makes
+    )
 
 
 def _publish(

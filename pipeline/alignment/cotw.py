@@ -183,8 +183,8 @@ def correlation_tables(
     radii = _node_radii(len(nodes) - 1, slack)
     return [
         segment_table(
-            source[:, nodes[k] : nodes[k + 1] + 1], target, weights, moving_floor, reference_floor,
-            slack, nodes[k], radii[k], radii[k + 1],
+            np.ascontiguousarray(source[:, nodes[k] : nodes[k + 1] + 1]), target, weights,
+            moving_floor, reference_floor, slack, nodes[k], radii[k], radii[k + 1],
         )
         for k in range(len(nodes) - 1)
     ]  # fmt: skip

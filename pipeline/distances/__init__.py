@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         weighted_distance,
     )
     from motionary.pipeline.distances.dtw import bidirectional_dtw_distance, dtw_distance, dtw_path
+    from motionary.pipeline.distances.dtw_pairs import pairwise_dtw
     from motionary.pipeline.distances.pairwise import PairwiseDistances, compare_clips, pairwise_distances
     from motionary.pipeline.distances.segment_dtw import segment_dtw_distance
     from motionary.pipeline.distances.zones import similar_zones
@@ -32,6 +33,7 @@ _MODULE_OF = {
     "dtw_path": "dtw",
     "fuzzy_distance": "curve",
     "pairwise_distances": "pairwise",
+    "pairwise_dtw": "dtw_pairs",
     "random_thresholds": "curve",
     "segment_dtw_distance": "segment_dtw",
     "similar_zones": "zones",
@@ -49,6 +51,7 @@ __all__ = [
     "dtw_path",
     "fuzzy_distance",
     "pairwise_distances",
+    "pairwise_dtw",
     "random_thresholds",
     "segment_dtw_distance",
     "similar_zones",

@@ -3,10 +3,10 @@
     D(i, j) = |F_i - G_j| = sqrt(sum over k of (F_ik - G_jk)^2),    k ascending
 
 A cell depends on its two frames alone, bit for bit, and on neither their order nor the shape around them:
-the differences are squared and added one dimension after the other, several columns at a time, with no
-fused operation. The rival, |F|^2 + |G|^2 - 2 F.G by a matrix product, takes a third of the time but loses
-small distances to cancellation, and its last bits depend on the product's shape: padding all shapes to 64
-cured that with OpenBLAS's AVX-512 kernels and not with its AVX2 ones.
+the squared differences are added one dimension after the other, each by a fused multiply-add, which rounds
+alike on every processor (`lanes.py`). The rival, |F|^2 + |G|^2 - 2 F.G by a matrix product, needs half the
+operations but loses small distances to cancellation, and its last bits depend on the product's shape: padding
+all shapes to 64 cured that with OpenBLAS's AVX-512 kernels and not with its AVX2 ones.
 
 Deviation from the paper: none.
 """
@@ -17,38 +17,33 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from motionary.pipeline.distances.kernel import kernel
+from motionary.pipeline.distances.lanes import LANES, ROWS, WORD, fill_block, padded
 from motionary.pipeline.motion import FloatArray
-
-# A clip's frames are padded to these multiples, as columns and as rows, and its dimensions to SWEEP: what one
-# turn of the kernel's loops takes. A dimension of zeros adds nothing; the padded cells are never read.
-COLUMNS = 16
-ROWS = 2
-SWEEP = 4
 
 
 class PackedClips(NamedTuple):
-    """Clips laid out for `frame_distances`, as rows and as columns; `depth` is the padded dimension.
+    """Clips laid out for `frame_distances`, as rows and as lanes, filled up by copies of their last frames.
 
     Parameters
     ----------
-    rows : array (sum of padded frames, depth)
+    rows : array (sum of frames filled up to ROWS, d)
         One clip's frames after another's.
-    columns : array (depth * sum of padded frames,)
-        Each clip transposed to (depth, padded frames), one after another.
+    lanes : array (blocks, d, LANES)
+        LANES frames a block, transposed, one clip's blocks after another's.
     frames : array (clips,)
         Frames in each clip.
-    row_start, column_start : array (clips + 1,)
-        Where each clip begins in `rows`, and in `columns` divided by `depth`; the last entry is the end.
+    row_start, block_start : array (clips + 1,)
+        Where each clip begins in `rows` and in `lanes`; the last entry is the end.
     """
 
     rows: FloatArray
-    columns: FloatArray
+    lanes: FloatArray
     frames: NDArray[np.int64]
     row_start: NDArray[np.int64]
-    column_start: NDArray[np.int64]
+    block_start: NDArray[np.int64]
 
 
 def cost_matrix(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -74,15 +69,10 @@ def cost_matrix(a: ArrayLike, b: ArrayLike) -> FloatArray:
         or the dimensions differ.
     """
     first, second = checked_clips([a, b], ["a", "b"])
-    rows, columns = pack_clips([first]).rows, pack_clips([second]).columns
-    costs = np.empty((len(rows), len(columns) // rows.shape[1]))
-    frame_distances(rows, columns.reshape(rows.shape[1], -1), costs)
-    return costs[: len(first), : len(second)].astype(first.dtype)
-
-
-def padded(count: int, multiple: int) -> int:
-    """Return `count` rounded up to a multiple."""
-    return -(-count // multiple) * multiple
+    rows, lanes = pack_clips([first]).rows, pack_clips([second]).lanes
+    costs = np.empty((len(rows), len(lanes) * LANES), dtype=first.dtype)
+    frame_distances(rows, lanes, costs, np.empty((2, LANES), dtype=first.dtype))
+    return np.ascontiguousarray(costs[: len(first), : len(second)])
 
 
 def checked_clips(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[FloatArray]:
@@ -142,43 +132,40 @@ def checked_costs(cost: ArrayLike) -> NDArray[np.float64]:
     return costs
 
 
+def filled_up(costs: FloatArray) -> FloatArray:
+    """Fill a cost matrix up to whole lanes, and after its last row to a whole word, by zeros."""
+    return np.pad(costs, ((0, WORD // LANES), (0, -costs.shape[1] % LANES)))
+
+
 def pack_clips(clips: Sequence[FloatArray]) -> PackedClips:
-    """Lay out checked clips of one dtype for `frame_distances`, padded with zeros."""
+    """Lay out checked clips of one dtype for `frame_distances`."""
     frames = np.array([len(clip) for clip in clips], dtype=np.int64)
-    row_start = np.concatenate([[0], np.cumsum([padded(len(clip), ROWS) for clip in clips])])
-    column_start = np.concatenate([[0], np.cumsum([padded(len(clip), COLUMNS) for clip in clips])])
+    row_start = np.concatenate([[0], np.cumsum(padded(frames, ROWS))])
+    block_start = np.concatenate([[0], np.cumsum(padded(frames, LANES))]) // LANES
     dimensions = clips[0].shape[1]
-    depth = padded(dimensions, SWEEP)
-    rows = np.zeros((row_start[-1], depth), dtype=clips[0].dtype)
-    columns = np.zeros(column_start[-1] * depth, dtype=clips[0].dtype)
+    rows = np.empty((row_start[-1], dimensions), dtype=clips[0].dtype)
+    lanes = np.empty((block_start[-1], dimensions, LANES), dtype=clips[0].dtype)
     for index, clip in enumerate(clips):
-        row, column, end = row_start[index], column_start[index], column_start[index + 1]
-        rows[row : row + len(clip), :dimensions] = clip
-        columns[column * depth : end * depth].reshape(depth, -1)[:dimensions, : len(clip)] = clip.T
-    return PackedClips(rows, columns, frames, row_start, column_start)
+        row, end = row_start[index : index + 2]
+        block, last_block = block_start[index : index + 2]
+        filled = clip[np.minimum(np.arange((last_block - block) * LANES), len(clip) - 1)]
+        rows[row:end] = filled[: end - row]
+        lanes[block:last_block] = filled.reshape(-1, LANES, dimensions).swapaxes(1, 2)
+    return PackedClips(rows, lanes, frames, row_start, block_start)
 
 
-@njit(cache=True, nogil=True)
-def frame_distances(rows, columns, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (rows, width) from rows (rows, depth) and columns (depth, width), padded by `pack_clips`.
+@kernel
+def frame_distances(rows, lanes, out, extremes):  # type: ignore[no-untyped-def]
+    """Fill `out` (rows, blocks * LANES) from rows (rows, d) and lanes (blocks, d, LANES) of `pack_clips`.
 
-    Written so that the compiler vectorises over the columns: each cell still adds its terms in order of k.
+    Returns the least and the greatest cost; `extremes` (2, LANES) is room for those of every lane.
     """
-    depth, width = columns.shape
-    sums, sums_below = np.empty(width, columns.dtype), np.empty(width, columns.dtype)
-    for i in range(0, rows.shape[0], ROWS):
-        sums[:] = 0
-        sums_below[:] = 0
-        for k in range(0, depth, SWEEP):
-            x0, x1, x2, x3 = rows[i, k], rows[i, k + 1], rows[i, k + 2], rows[i, k + 3]
-            y0, y1, y2, y3 = rows[i + 1, k], rows[i + 1, k + 1], rows[i + 1, k + 2], rows[i + 1, k + 3]
-            c0, c1, c2, c3 = columns[k], columns[k + 1], columns[k + 2], columns[k + 3]
-            for j in range(width):
-                d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
-                e0, e1, e2, e3 = y0 - c0[j], y1 - c1[j], y2 - c2[j], y3 - c3[j]
-                sums[j] = (((sums[j] + d0 * d0) + d1 * d1) + d2 * d2) + d3 * d3
-                sums_below[j] = (((sums_below[j] + e0 * e0) + e1 * e1) + e2 * e2) + e3 * e3
-        for j in range(width):
-            out[i, j] = np.sqrt(sums[j])
-        for j in range(width):
-            out[i + 1, j] = np.sqrt(sums_below[j])
+    for lane in range(LANES):
+        extremes[0, lane], extremes[1, lane] = np.inf, -np.inf
+    for block in range(len(lanes)):
+        for i in range(0, len(rows), ROWS):
+            fill_block(rows, i, lanes, block, out, extremes)
+    low, high = extremes[0, 0], extremes[1, 0]
+    for lane in range(1, LANES):
+        low, high = min(low, extremes[0, lane]), max(high, extremes[1, lane])
+    return low, high

@@ -15,19 +15,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.distances.cost import checked_costs
-from motionary.pipeline.distances.dtw import both_directions
-from motionary.pipeline.distances.fixed_point import (
-    length_bits_of,
-    mean_quanta,
-    pack,
-    quantum_of,
-    refuse_too_long,
-)
-from motionary.pipeline.distances.segment_dtw import make_workspace, segment_quanta
+from motionary.pipeline.distances.cost import checked_costs, filled_up
+from motionary.pipeline.distances.fixed_point import refuse_too_long
+from motionary.pipeline.distances.kernel import kernel
+from motionary.pipeline.distances.segment_dtw import make_workspace, prepare, segment_quanta
 from motionary.pipeline.distances.zones import checked_thresholds, limit_of
 
 # Midpoints of the paper's intervals above .3, and 1.
@@ -75,10 +68,11 @@ def dtw_curve(cost: ArrayLike, thresholds: ArrayLike = THRESHOLDS) -> NDArray[np
         `cost` is not a matrix of finite costs or too long, or a threshold is outside 0 .. 1.
     """
     costs = checked_costs(cost)
-    refuse_too_long(*costs.shape)
+    m, n = costs.shape
+    refuse_too_long(m, n)
     lambdas = checked_thresholds(thresholds)
     curve = np.empty(len(lambdas))
-    fill_curve(costs, lambdas, curve, make_workspace(*costs.shape))
+    fill_curve(filled_up(costs), m, n, costs.min(), costs.max(), lambdas, curve, make_workspace(m, n))
     return curve
 
 
@@ -148,35 +142,15 @@ def _weight(threshold: float) -> float:
     return math.exp(-((threshold - MEAN) ** 2) / (2 * DEVIATION**2)) / (DEVIATION * math.sqrt(2 * math.pi))
 
 
-@njit(cache=True, nogil=True)
-def fill_curve(costs, thresholds, curve, work):  # type: ignore[no-untyped-def]
-    """Fill `curve` (T,) from costs (m, n) float64; return the DTW and the B-DTW of the whole matrix."""
-    m, n = costs.shape
-    low, high = _extremes(costs)
-    length_bits = length_bits_of(m, n)
-    quantum = quantum_of(high, length_bits)
-    words = work.words[: m * n].reshape((m, n))
-    pack(costs, quantum, length_bits, words)
-    ahead, back = both_directions(words, 0, m - 1, 0, n - 1, work.forward, work.backward)
-    dtw = mean_quanta(ahead, length_bits) * quantum
-    b_dtw = min(dtw, mean_quanta(back, length_bits) * quantum)
-    work.known_zones[:] = -1
+@kernel
+def fill_curve(costs, m, n, low, high, thresholds, curve, work):  # type: ignore[no-untyped-def]
+    """Fill `curve` (T,) from costs (rows, width), of which (m, n) count; return their DTW and their B-DTW."""
+    ahead, back, quantum, length_bits = prepare(costs, m, n, high, work)
+    dtw, b_dtw = ahead * quantum, min(ahead, back) * quantum
     for t in range(len(thresholds)):
         if thresholds[t] == 1.0:
             curve[t] = b_dtw
         else:
             limit = limit_of(low, high, thresholds[t])
-            curve[t] = segment_quanta(costs, limit, words, length_bits, work) * quantum
+            curve[t] = segment_quanta(costs, m, n, limit, length_bits, work) * quantum
     return dtw, b_dtw
-
-
-@njit(cache=True, nogil=True)
-def _extremes(costs):  # type: ignore[no-untyped-def]
-    """Least and greatest cost; column by column first, which the compiler can vectorise."""
-    lows, highs = costs[0].copy(), costs[0].copy()
-    for i in range(1, costs.shape[0]):
-        row = costs[i]
-        for j in range(len(row)):
-            lows[j] = row[j] if row[j] < lows[j] else lows[j]
-            highs[j] = row[j] if row[j] > highs[j] else highs[j]
-    return lows.min(), highs.max()

@@ -13,7 +13,6 @@ Totals are exact integers (`fixed_point.py`); the distance of a matrix and of it
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from motionary.pipeline.distances.cost import checked_costs
@@ -25,6 +24,8 @@ from motionary.pipeline.distances.fixed_point import (
     quantum_of,
     refuse_too_long,
 )
+from motionary.pipeline.distances.kernel import kernel
+from motionary.pipeline.distances.recurrence import both_ways
 
 
 def dtw_distance(cost: ArrayLike) -> float:
@@ -98,51 +99,26 @@ def dtw_path(cost: ArrayLike) -> NDArray[np.int64]:
 
 
 def packed_costs(costs: NDArray[np.float64]) -> tuple[NDArray[np.int64], float, int]:
-    """Pack checked costs into words; return the words, their quantum and the bits of a path's length."""
+    """Pack checked costs into words (m, n); return them, their quantum and the bits of a path's length."""
     m, n = costs.shape
     refuse_too_long(m, n)
     length_bits = length_bits_of(m, n)
     quantum = quantum_of(costs.max(), length_bits)
-    words = np.empty((m, n), dtype=np.int64)
-    pack(costs, quantum, length_bits, words)
-    return words, quantum, length_bits
+    words = np.empty(m * n, dtype=np.int64)
+    pack(costs.ravel(), quantum, length_bits, words)
+    return words.reshape(m, n), quantum, length_bits
 
 
 def _distances(cost: ArrayLike) -> tuple[float, float]:
     words, quantum, length_bits = packed_costs(checked_costs(cost))
     m, n = words.shape
-    forward, backward = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    totals = both_directions(words, 0, m - 1, 0, n - 1, forward, backward)
-    ahead, back = (mean_quanta(total, length_bits) * quantum for total in totals)
-    return ahead, back
+    ahead, back = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    totals = both_ways(words.ravel(), n, 0, m - 1, 0, n - 1, ahead, back, 0)
+    forward, backward = (mean_quanta(total, length_bits) * quantum for total in totals)
+    return forward, backward
 
 
-@njit(cache=True, nogil=True)
-def both_directions(words, top, bottom, left, right, forward, backward):  # type: ignore[no-untyped-def]
-    """Least totals over a rectangle (inclusive), its columns taken forward and backward.
-
-    `forward` and `backward` hold one row of T each. The two recurrences are independent: side by side, each
-    hides the other's waiting for its left neighbour.
-    """
-    width = right - left + 1
-    for j in range(width):
-        forward[j] = backward[j] = UNREACHED
-    corner = 0
-    for i in range(top, bottom + 1):
-        row = words[i, left : right + 1]
-        ahead = back = UNREACHED
-        ahead_diagonal = back_diagonal = corner
-        for j in range(width):
-            ahead_above, back_above = forward[j], backward[j]
-            ahead = row[j] + min(ahead, ahead_diagonal, ahead_above)
-            back = row[width - 1 - j] + min(back, back_diagonal, back_above)
-            forward[j], backward[j] = ahead, back
-            ahead_diagonal, back_diagonal = ahead_above, back_above
-        corner = UNREACHED
-    return ahead, back
-
-
-@njit(cache=True, nogil=True)
+@kernel
 def _accumulate(words):  # type: ignore[no-untyped-def]
     """Replace every word by the least total of a path that ends there."""
     m, n = words.shape
@@ -154,7 +130,7 @@ def _accumulate(words):  # type: ignore[no-untyped-def]
             words[i, j] += min(words[i, j - 1], words[i - 1, j - 1], words[i - 1, j])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _trace_back(totals, path):  # type: ignore[no-untyped-def]
     """Fill `path` from its end; return the row where it begins."""
     i, j = totals.shape[0] - 1, totals.shape[1] - 1

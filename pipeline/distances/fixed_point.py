@@ -8,8 +8,9 @@ order of addition, so that equal ones may come out different; here a cost c beco
 
 Sums of words are exact, compare as (total, length), and mean the same in whatever order they are formed.
 `length_bits` holds the longest path, m + n - 1 cells; `value_bits` = min(52, 62 - 2 length_bits), so that no
-total exceeds 62 bits: 48 bits of cost for clips of 60 frames, 30 for clips of 20,000. A distance is
-therefore within max(D) / 2^value_bits of the one in real numbers, whatever the unit of the costs.
+total exceeds 62 bits: 48 bits of cost for clips of 60 frames, 30 for clips of 20,000. Every cost is within
+half a quantum of its own value, and the mean along any path within one, whatever the unit. Totals closer
+than that count as equal, and the shorter of such paths is taken.
 
 The rival is one quantum for all matrices: it overflows on costs in millimetres or loses those in kilometres.
 """
@@ -19,12 +20,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from motionary.pipeline.distances.kernel import kernel
 
 # Above every word and every total; the sum of two is still a 64-bit integer.
 UNREACHED = 1 << 62
 # A 64-bit float holds integers, and integers and a half, exactly below this power of two.
 MOST_VALUE_BITS = 52
+# The floats from 2^52 to 2^53 are the integers; as a 64-bit integer, 2^52 reads so.
+INTEGERS, INTEGER_BITS = 2.0**52, 0x433 << 52
 # Longest path for which a cost keeps 24 bits, the precision of the float32 it was computed in.
 MOST_LENGTH_BITS = 19
 
@@ -38,7 +42,7 @@ def refuse_too_long(rows: int, columns: int) -> None:
         )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def length_bits_of(frames_a, frames_b):  # type: ignore[no-untyped-def]
     """Bits that hold the number of cells of the longest path, m + n - 1."""
     bits = 1
@@ -47,7 +51,7 @@ def length_bits_of(frames_a, frames_b):  # type: ignore[no-untyped-def]
     return bits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
     """Power of two that brings the largest cost just under 2^value_bits."""
     if largest == 0:
@@ -57,17 +61,24 @@ def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
     return math.ldexp(1.0, max(math.frexp(largest)[1] - value_bits, -960))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pack(costs, quantum, length_bits, words):  # type: ignore[no-untyped-def]
-    """Fill `words` (m, n) int64 from `costs` (m, n) float64."""
+    """Fill `words` (cells,) int64 from `costs` (cells,)."""
     per_quantum = 1.0 / quantum
-    for i in range(words.shape[0]):
-        cost_row, word_row = costs[i], words[i]
-        for j in range(words.shape[1]):
-            word_row[j] = (np.int64(np.rint(cost_row[j] * per_quantum)) << length_bits) + 1
+    for cell in range(len(words)):
+        words[cell] = word_of(costs[cell], per_quantum, length_bits)
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def word_of(cost, per_quantum, length_bits):  # type: ignore[no-untyped-def]
+    """Pack one cost; `per_quantum` is one over the quantum."""
+    # Adding 2^52 rounds to the nearest integer, which then stands in the low bits: few processors convert
+    # several floats to 64-bit integers at once, all add them.
+    rounded = np.float64(cost * per_quantum + INTEGERS).view(np.int64)
+    return ((rounded - INTEGER_BITS) << length_bits) + 1
+
+
+@kernel
 def mean_quanta(total, length_bits):  # type: ignore[no-untyped-def]
     """Total cost over number of cells of a path's word, in quanta, rounded to the nearest, halves up."""
     length = total & ((1 << length_bits) - 1)

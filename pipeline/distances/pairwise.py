@@ -2,23 +2,30 @@
 
 A tile is every clip of one list against every clip of another. Its pairs share nothing but scratch memory,
 so a distance has the same bits in any tile, on any thread and in either order of the two clips. A thread's
-scratch memory is about 30 bytes a cell of its largest cost matrix.
+scratch memory is about 45 bytes a cell of its largest cost matrix.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.distances.cost import PackedClips, checked_clips, frame_distances, pack_clips
+from motionary.pipeline.distances.cost import (
+    PackedClips,
+    checked_clips,
+    frame_distances,
+    pack_clips,
+)
 from motionary.pipeline.distances.curve import THRESHOLDS, fill_curve, weighted_sums
 from motionary.pipeline.distances.fixed_point import refuse_too_long
+from motionary.pipeline.distances.kernel import kernel
+from motionary.pipeline.distances.lanes import LANES, ROWS, WORD, padded
 from motionary.pipeline.distances.segment_dtw import make_workspace
 from motionary.pipeline.distances.zones import checked_thresholds
 from motionary.pipeline.motion import FloatArray
@@ -72,7 +79,7 @@ def compare_clips(
         the threshold outside 0 .. 1.
     """
     names = [f"clips_a[{i}]" for i in range(len(clips_a))] + [f"clips_b[{i}]" for i in range(len(clips_b))]
-    clips = _checked([*clips_a, *clips_b], names)
+    clips = comparable_clips([*clips_a, *clips_b], names)
     lambdas = checked_thresholds(thresholds)
     if not len(clips_a) or not len(clips_b):
         empty = np.empty((len(clips_a), len(clips_b), len(lambdas)))
@@ -113,40 +120,71 @@ def pairwise_distances(
         the threshold, `n_jobs` or `tile` that is out of its range.
     """
     lambdas = checked_thresholds(thresholds)
-    for name, value in (("n_jobs", n_jobs), ("tile", tile)):
-        if value is not None and value < 1:
-            raise ValueError(f"{name} is {value}; it must be at least 1")
-    arrays = _checked(clips, [f"clips[{i}]" for i in range(len(clips))])
-    starts = range(0, len(arrays), tile)
-    packed = {start: pack_clips(arrays[start : start + tile]) for start in starts}
+    jobs = threads_to_use(n_jobs, tile)
+    arrays = comparable_clips(clips, [f"clips[{i}]" for i in range(len(clips))])
     pairs = len(arrays) * (len(arrays) - 1) // 2
-    dtw, b_dtw, curve = np.empty(pairs), np.empty(pairs), np.empty((pairs, len(lambdas)))
+    results = np.empty(pairs), np.empty(pairs), np.empty((pairs, len(lambdas)))
+    compare_all(arrays, jobs, tile, lambda a, b, upper: _compare_packed(a, b, lambdas, upper), results)
+    return _record(*results, lambdas)
 
-    def compare(first: int, second: int) -> None:
-        tile_dtw, tile_b_dtw, tile_curve = _compare_packed(
-            packed[first], packed[second], lambdas, first == second
-        )
-        for row in range(len(tile_dtw)):
+
+def compare_all(
+    clips: list[FloatArray],
+    jobs: int,
+    tile: int,
+    compare: Callable[[PackedClips, PackedClips, bool], tuple[NDArray[np.float64], ...]],
+    results: tuple[NDArray[np.float64], ...],
+) -> None:
+    """Compare comparable clips tile by tile, on `jobs` threads.
+
+    `compare` returns (na, nb, ...) arrays of a tile; where its third argument is true the two lists are the
+    same and only pairs above the diagonal are taken. They go to their places in the condensed `results`.
+    """
+    starts = range(0, len(clips), tile)
+    packed = {start: pack_clips(clips[start : start + tile]) for start in starts}
+
+    def fill(first: int, second: int) -> None:
+        found = compare(packed[first], packed[second], first == second)
+        for row in range(len(found[0])):
             i = first + row
             skipped = row + 1 if first == second else 0
-            begin = i * len(arrays) - i * (i + 1) // 2 + second + skipped - i - 1
-            place = slice(begin, begin + tile_dtw.shape[1] - skipped)
-            dtw[place], b_dtw[place] = tile_dtw[row, skipped:], tile_b_dtw[row, skipped:]
-            curve[place] = tile_curve[row, skipped:]
+            begin = i * len(clips) - i * (i + 1) // 2 + second + skipped - i - 1
+            for result, values in zip(results, found, strict=True):
+                result[begin : begin + len(values[row]) - skipped] = values[row, skipped:]
 
-    with ThreadPoolExecutor(n_jobs or usable_processors()) as threads:
-        for task in [threads.submit(compare, i, j) for i in starts for j in starts if i <= j]:
+    with ThreadPoolExecutor(jobs) as threads:
+        for task in [threads.submit(fill, i, j) for i in starts for j in starts if i <= j]:
             task.result()
-    return _record(dtw, b_dtw, curve, lambdas)
 
 
-def _checked(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[FloatArray]:
+def comparable_clips(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[FloatArray]:
+    """Convert clips to arrays of one dtype and check that each can be compared with each.
+
+    Raises
+    ------
+    ValueError
+        As `pairwise_distances`.
+    """
     if not len(clips):
         return []
     arrays = checked_clips(clips, names)
     longest = max(len(array) for array in arrays)
     refuse_too_long(longest, longest)
     return arrays
+
+
+def threads_to_use(n_jobs: int | None, tile: int) -> int:
+    """Return the number of threads, after a check of it and of the tile.
+
+    Raises
+    ------
+    ValueError
+        Either is less than 1.
+    """
+    for name, value in (("n_jobs", n_jobs), ("tile", tile)):
+        if value is not None and value < 1:
+            raise ValueError(f"{name} is {value}; it must be at least 1")
+    return n_jobs or usable_processors()
 
 
 def usable_processors() -> int:
@@ -178,22 +216,57 @@ def _compare_packed(
     """Return DTW, B-DTW and curve of a tile, zero where `upper` leaves a pair out."""
     shape = len(a.frames), len(b.frames)
     dtw, b_dtw, curve = np.zeros(shape), np.zeros(shape), np.zeros((*shape, len(thresholds)))
-    costs = np.empty(np.diff(a.row_start).max() * np.diff(b.column_start).max())
-    work = make_workspace(int(a.frames.max()), int(b.frames.max()))
-    _fill_tile(a, b, thresholds, upper, costs, work, dtw, b_dtw, curve)
+    work = make_workspace(*largest_pair(a, b))
+    room = room_for_costs(a, b)
+    _fill_tile(a, b, thresholds, upper, room, work, dtw, b_dtw, curve)
     return dtw, b_dtw, curve
 
 
-@njit(cache=True, nogil=True)
-def _fill_tile(a, b, thresholds, upper, costs, work, dtw, b_dtw, curve):  # type: ignore[no-untyped-def]
+def largest_pair(a: PackedClips, b: PackedClips) -> tuple[int, int]:
+    """Return the most rows and the most columns of a pair's costs; see `pair_costs`."""
+    longest = int(a.frames.max()), int(b.frames.max())
+    return min(longest), max(longest)
+
+
+class CostRoom(NamedTuple):
+    """Room for the costs of one pair, and for the least and the greatest of every lane."""
+
+    costs: FloatArray
+    extremes: FloatArray
+
+
+def room_for_costs(a: PackedClips, b: PackedClips) -> CostRoom:
+    """Allocate room for any pair of a tile; its costs are read by whole words, the last beyond their end."""
+    rows, columns = largest_pair(a, b)
+    cells = padded(rows, ROWS) * padded(columns, LANES)
+    return CostRoom(
+        costs=np.empty(cells + WORD, dtype=a.rows.dtype),
+        extremes=np.empty((2, LANES), dtype=a.rows.dtype),
+    )
+
+
+@kernel
+def _fill_tile(a, b, thresholds, upper, room, work, dtw, b_dtw, curve):  # type: ignore[no-untyped-def]
     """Compare every clip of `a` with every clip of `b`, or with those of higher index alone (`upper`)."""
-    depth = a.rows.shape[1]
     for p in range(len(a.frames)):
-        rows = a.rows[a.row_start[p] : a.row_start[p + 1]]
         for q in range(p + 1 if upper else 0, len(b.frames)):
-            start, end = b.column_start[q], b.column_start[q + 1]
-            columns = b.columns[start * depth : end * depth].reshape((depth, end - start))
-            pair_costs = costs[: len(rows) * (end - start)].reshape((len(rows), end - start))
-            frame_distances(rows, columns, pair_costs)
-            inner = pair_costs[: a.frames[p], : b.frames[q]]
-            dtw[p, q], b_dtw[p, q] = fill_curve(inner, thresholds, curve[p, q], work)
+            m, n, rows, width, low, high = pair_costs(a, p, b, q, room)
+            costs = room.costs[: rows * width].reshape((rows, width))
+            dtw[p, q], b_dtw[p, q] = fill_curve(costs, m, n, low, high, thresholds, curve[p, q], work)
+
+
+@kernel
+def pair_costs(a, p, b, q, room):  # type: ignore[no-untyped-def]
+    """Fill `room` with the costs of clips p of `a` and q of `b`, the longer one's frames as columns.
+
+    Returns the frames of the rows' and of the columns' clip, the rows and the width of the costs, and the
+    least and the greatest of them. Long rows are filled up less, and are quicker to go along.
+    """
+    if a.frames[p] > b.frames[q]:
+        a, p, b, q = b, q, a, p
+    rows = a.rows[a.row_start[p] : a.row_start[p + 1]]
+    lanes = b.lanes[b.block_start[q] : b.block_start[q + 1]]
+    width = len(lanes) * LANES
+    costs = room.costs[: len(rows) * width].reshape((len(rows), width))
+    low, high = frame_distances(rows, lanes, costs, room.extremes)
+    return a.frames[p], b.frames[q], len(rows), width, low, high

@@ -15,27 +15,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.distances.cost import checked_costs
-
-# Columns in a word of bits: one fewer than the machine's 64, so that no word is negative.
-WORD = 63
-
-
-def _count_trailing_zeros(typingctx: Any, word: Any) -> Any:
-    """Count the zero bits below the lowest set bit of a 64-bit integer."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.cttz(arguments[0], cgutils.false_bit)
-
-    return types.int64(types.int64), generate
-
-
-_trailing_zeros: Any = intrinsic(_count_trailing_zeros)
+from motionary.pipeline.distances.cost import checked_costs, filled_up
+from motionary.pipeline.distances.kernel import kernel
+from motionary.pipeline.distances.lanes import WORD, bits_at_most, trailing_zeros
 
 
 def similar_zones(cost: ArrayLike, threshold: float) -> NDArray[np.int64]:
@@ -59,11 +43,12 @@ def similar_zones(cost: ArrayLike, threshold: float) -> NDArray[np.int64]:
         `cost` is not a matrix of finite costs, or `threshold` is outside 0 .. 1.
     """
     costs = checked_costs(cost)
+    m, n = costs.shape
     (value,) = checked_thresholds([threshold])
-    bits = np.empty((len(costs), bit_words(costs.shape[1])), dtype=np.int64)
-    keep_bits(costs, limit_of(costs.min(), costs.max(), value), bits)
-    zones = np.empty((most_zones(*costs.shape), 4), dtype=np.int64)
-    count = find_zones(bits, zones, np.empty(len(zones), dtype=np.int64), run_buffer(costs.shape[1]))
+    bits = np.empty((m, bit_words(n)), dtype=np.uint64)
+    keep_bits(filled_up(costs), limit_of(costs.min(), costs.max(), value), n, bits)
+    zones = np.empty((most_zones(m, n), 4), dtype=np.int64)
+    count = find_zones(bits, zones, np.empty(len(zones), dtype=np.int64), run_room(n))
     found = zones[:count].astype(np.int64)
     return found[np.lexsort(found.T[::-1])]
 
@@ -90,98 +75,100 @@ def most_zones(rows: int, columns: int) -> int:
     return -(-rows // 2) * -(-columns // 2)
 
 
-def run_buffer(columns: int) -> NDArray[np.int64]:
-    """Room for the runs (first column, last column, set) of two rows."""
-    return np.empty((2, columns // 2 + 1, 3), dtype=np.int64)
+def run_room(columns: int) -> NDArray[np.int64]:
+    """Room for the first column, the last column and the set of every run in two rows."""
+    return np.empty((3, 2 * (columns // 2 + 1)), dtype=np.int64)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bit_words(columns):  # type: ignore[no-untyped-def]
     """Words of bits that hold a row."""
     return (columns + WORD - 1) // WORD
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def limit_of(low, high, threshold):  # type: ignore[no-untyped-def]
     """Delta of a threshold lambda (eq. 6)."""
     return high if threshold == 1.0 else low + threshold * (high - low)
 
 
-@njit(cache=True, nogil=True)
-def keep_bits(costs, limit, bits):  # type: ignore[no-untyped-def]
-    """Fill `bits` (m, words): bit j of word w is set where the cost at column 63 w + j is at most `limit`."""
-    columns = costs.shape[1]
-    for i in range(costs.shape[0]):
-        for w in range(bits.shape[1]):
-            row = costs[i, w * WORD : min(columns, (w + 1) * WORD)]
-            word = np.int64(0)
-            for j in range(len(row)):
-                word |= np.int64(row[j] <= limit) << j
-            bits[i, w] = word
+@kernel
+def keep_bits(costs, limit, columns, bits):  # type: ignore[no-untyped-def]
+    """Fill `bits` (m, words): bit j of word w is set where the cost at column 64 w + j is at most `limit`.
+
+    `costs` (rows, width) are filled up to whole lanes and, after the last row, to a whole word; of their
+    columns, the first `columns` count.
+    """
+    width = costs.shape[1]
+    flat = costs.reshape(costs.size)
+    largest = _rounded_down(limit, flat)
+    inside = ~np.uint64(0) >> np.uint64(-columns % WORD)
+    last = bits.shape[1] - 1
+    for i in range(bits.shape[0]):
+        for w in range(last):
+            bits[i, w] = bits_at_most(flat, i * width + w * WORD, largest)
+        bits[i, last] = bits_at_most(flat, i * width + last * WORD, largest) & inside
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def _rounded_down(limit, costs):  # type: ignore[no-untyped-def]
+    """Return the greatest number of the costs' type that is not above `limit`: it keeps the same costs."""
+    nearest = costs.dtype.type(limit)
+    if np.float64(nearest) > limit:
+        return np.nextafter(nearest, costs.dtype.type(-np.inf))
+    return nearest
+
+
+@kernel
 def find_zones(bits, zones, parents, runs):  # type: ignore[no-untyped-def]
     """Fill `zones` (count, 4) with the rectangles around the 8-connected regions of `bits`; return the count.
 
     `parents` is the union-find forest (a set's representative is its own parent), `zones` the rectangles of
     its sets until, at the end, the representatives' are moved to the front.
     """
+    starts, stops, owners = runs[0], runs[1], runs[2]
+    half = runs.shape[1] // 2
+    row_begin, above_begin, above_end = 0, half, half
     sets = 0
-    count_above = 0
     for i in range(bits.shape[0]):
-        row, above = i & 1, 1 - (i & 1)
-        count = _find_runs(bits, i, runs, row)
-        first_touching = 0
-        for r in range(count):
-            start, stop = runs[row, r, 0], runs[row, r, 1]
-            while first_touching < count_above and runs[above, first_touching, 1] < start - 1:
-                first_touching += 1
-            own = -1
-            touching = first_touching
-            while touching < count_above and runs[above, touching, 0] <= stop + 1:
-                other = _representative(parents, runs[above, touching, 2])
-                own = other if own < 0 else _join(parents, zones, own, other)
-                touching += 1
-            if own < 0:
-                own = sets
-                sets += 1
-                parents[own] = own
-                zones[own, 0], zones[own, 2], zones[own, 3] = i, start, stop
-            zones[own, 1] = i
-            zones[own, 2] = min(zones[own, 2], start)
-            zones[own, 3] = max(zones[own, 3], stop)
-            runs[row, r, 2] = own
-        count_above = count
+        place, touching = row_begin, above_begin
+        last = -2
+        for w in range(bits.shape[1]):
+            word = bits[i, w]
+            while word:
+                low = trailing_zeros(word)
+                start: Any = np.int64(low) + w * WORD
+                stop = start + np.int64(trailing_zeros(~(word >> low))) - 1
+                # Adding its lowest bit carries through the first run of a word and leaves the others.
+                word &= word + (np.uint64(1) << low)
+                own: Any = -1
+                if start == last + 1:
+                    # The run goes on from the word before.
+                    place -= 1
+                    start, own = starts[place], owners[place]
+                last = stop
+                while touching < above_end and stops[touching] < start - 1:
+                    touching += 1
+                other = touching
+                while other < above_end and starts[other] <= stop + 1:
+                    found = _representative(parents, owners[other])
+                    own = found if own < 0 else _join(parents, zones, own, found)
+                    other += 1
+                if own < 0:
+                    own = sets
+                    sets += 1
+                    parents[own] = own
+                    zones[own, 0], zones[own, 2], zones[own, 3] = i, start, stop
+                zones[own, 1] = i
+                zones[own, 2] = min(zones[own, 2], start)
+                zones[own, 3] = max(zones[own, 3], stop)
+                starts[place], stops[place], owners[place] = start, stop, own
+                place += 1
+        above_begin, above_end, row_begin = row_begin, place, half - row_begin
     return _move_to_front(parents, zones, sets)
 
 
-@njit(cache=True, nogil=True)
-def _find_runs(bits, i, runs, row):  # type: ignore[no-untyped-def]
-    """Fill `runs[row]` with the first and last column of every run of set bits in row i; return their number.
-
-    Here and above, arrays are passed whole with an index: a view of a row costs more than the row's work.
-    """
-    count = 0
-    last = -2
-    for w in range(bits.shape[1]):
-        word = bits[i, w]
-        while word:
-            start = _trailing_zeros(word)
-            length = _trailing_zeros(~(word >> start))
-            word &= -1 << (start + length)
-            start += w * WORD
-            if start == last + 1:
-                count -= 1
-            else:
-                runs[row, count, 0] = start
-            last = start + length - 1
-            runs[row, count, 1] = last
-            count += 1
-    return count
-
-
-@njit(cache=True, nogil=True)
+@kernel
 def _representative(parents, member):  # type: ignore[no-untyped-def]
     while parents[member] != member:
         parents[member] = parents[parents[member]]
@@ -189,7 +176,7 @@ def _representative(parents, member):  # type: ignore[no-untyped-def]
     return member
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _join(parents, zones, a, b):  # type: ignore[no-untyped-def]
     """Join two sets, given by their representatives; return the joined set's."""
     if a == b:
@@ -202,7 +189,7 @@ def _join(parents, zones, a, b):  # type: ignore[no-untyped-def]
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _move_to_front(parents, zones, sets):  # type: ignore[no-untyped-def]
     """Move the representatives' rectangles to the front of `zones`; return their number."""
     count = 0

@@ -6,7 +6,6 @@ import numpy as np
 import pyarrow as pa
 
 from motionary.pipeline.config import DistanceConfig
-from motionary.pipeline.distances import THRESHOLDS, compare_clips, pairwise_distances, random_thresholds
 from motionary.pipeline.stages.columns import matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
@@ -30,6 +29,8 @@ def compare(first: pa.Table, second: pa.Table, config: DistanceConfig) -> dict[s
     dict of str to pyarrow.Table
         `pairs`.
     """
+    from motionary.pipeline.distances import THRESHOLDS, compare_clips, pairwise_distances, random_thresholds
+
     thresholds = THRESHOLDS if config.thresholds == "midpoints" else random_thresholds(config.seed)
     one, other = per_clip(first), per_clip(second)
     clips, others = ([matrix(clip["feature"]) for clip in batch.values()] for batch in (one, other))

@@ -64,6 +64,18 @@ def replay(linkage, key):
     return steps
 
 
+def agglomerate(clips, key):
+    """Every partition on the way from single clips to one cluster, and the key of the merge that made it."""
+    clusters, steps = {frozenset([clip]) for clip in range(clips)}, []
+    while len(clusters) > 1:
+        height, a, b = min(
+            ((key(a, b), a, b) for a, b in combinations(clusters, 2)), key=lambda step: step[0]
+        )
+        clusters = clusters - {a, b} | {a | b}
+        steps.append((height, clusters))
+    return steps
+
+
 def partition(linkage, kappa):
     """The clusters, as a set of sets, that the first N - kappa merges leave."""
     clips = len(linkage) + 1

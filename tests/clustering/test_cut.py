@@ -1,14 +1,26 @@
 """Cuts by threshold and count, threshold strips, and the choice among rules."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from scipy.cluster.hierarchy import linkage
-from scipy.spatial.distance import pdist
+from scipy.spatial.distance import pdist, squareform
 
-from motionary.pipeline.clustering import choose_cut, cut_tree, strip_of, threshold_strips, widest_strip
+from motionary.pipeline.clustering import (
+    average_linkage,
+    choose_cut,
+    complete_linkage,
+    cut_tree,
+    fuzzy_linkage,
+    strip_of,
+    threshold_strips,
+    ward_linkage,
+    widest_strip,
+)
 from motionary.pipeline.config import ClusterConfig
 from tests.clustering import naive
 
@@ -18,9 +30,20 @@ def dendrograms(draw, smallest=1):
     clips = draw(st.integers(smallest, 10))
     if clips == 1:
         return np.empty((0, 4))
+    link = draw(
+        st.sampled_from([partial(linkage, method="complete"), average_linkage, ward_linkage, intervals])
+    )
+    return link(draw_distances(draw, clips))
+
+
+def draw_distances(draw, clips):
     values = draw(st.sampled_from([st.integers(0, 3).map(float), st.floats(0, 10, allow_subnormal=False)]))
     pairs = clips * (clips - 1) // 2
-    return linkage(draw(st.lists(values, min_size=pairs, max_size=pairs)), "complete")
+    return np.array(draw(st.lists(values, min_size=pairs, max_size=pairs)))
+
+
+def intervals(distances):
+    return fuzzy_linkage(distances, distances + 1)
 
 
 def three_groups():
@@ -43,6 +66,20 @@ def test_a_threshold_keeps_the_merges_not_above_it(Z, data):
     mu = data.draw(st.sampled_from([-1.0, 0.0, 0.5, np.inf, *Z[:, 2].tolist()]))
     labels = cut_tree(Z, threshold=mu)
     assert naive.as_partition(labels.tolist()) == naive.partition(Z, naive.cluster_count(Z, mu))
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data())
+def test_no_cluster_of_complete_linkage_is_wider_than_the_threshold_and_no_two_could_join(data):
+    clips = data.draw(st.integers(2, 12))
+    distances = draw_distances(data.draw, clips)
+    mu = data.draw(st.sampled_from(sorted({0.0, 0.5, *distances.tolist()})))
+    labels = cut_tree(complete_linkage(distances), threshold=mu)
+    square = squareform(distances)
+    for a in range(labels.max() + 1):
+        for b in range(a + 1):
+            furthest = square[np.ix_(labels == a, labels == b)].max()
+            assert furthest <= mu if a == b else furthest > mu
 
 
 @settings(max_examples=100, deadline=None)

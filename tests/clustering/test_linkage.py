@@ -1,4 +1,7 @@
-"""Linkage: exact against SciPy where nothing ties, greedy at every merge where something does."""
+"""Linkage: exact against naive agglomeration and SciPy without ties, greedy at every merge with them."""
+
+import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -6,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.cluster.hierarchy import linkage
-from scipy.spatial.distance import pdist
+from scipy.spatial.distance import pdist, squareform
 
 from motionary.pipeline.clustering import average_linkage, complete_linkage, fuzzy_linkage, ward_linkage
 from tests.clustering import naive
@@ -18,9 +21,9 @@ METHODS = {
 }
 
 
-def condensed(values):
-    """Distances of 2 to 8 clips, metric or not."""
-    return st.integers(2, 8).flatmap(
+def condensed(values, most=8):
+    """Distances of 2 clips or more, metric or not."""
+    return st.integers(2, most).flatmap(
         lambda n: st.lists(values, min_size=n * (n - 1) // 2, max_size=n * (n - 1) // 2).map(np.array)
     )
 
@@ -28,6 +31,13 @@ def condensed(values):
 TIED = condensed(st.integers(0, 4).map(float))
 ROUNDED = condensed(st.sampled_from([0.1, 0.2, 0.3, 0.7, 1e-9]))
 FREE = condensed(st.floats(0, 100, allow_subnormal=False))
+MANY_TIES = st.builds(
+    lambda clips, most, seed: np.random.default_rng(seed).integers(0, most, math.comb(clips, 2)) / 1.0,
+    st.integers(9, 14),
+    st.integers(1, 6),
+    st.integers(0, 2**16),
+)
+TAUS = st.sampled_from([0, 0.25, 0.5, 1])
 
 
 def assert_greedy(Z, key, rooted=False):
@@ -42,8 +52,8 @@ def clips_in(distances):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=120, deadline=None)
-@given(distances=st.one_of(TIED, ROUNDED, FREE))
+@settings(max_examples=100, deadline=None)
+@given(distances=st.one_of(TIED, ROUNDED, FREE, MANY_TIES))
 def test_every_merge_is_the_nearest_pair_of_its_partition(method, distances):
     link, key = METHODS[method]
     Z = link(distances)
@@ -52,12 +62,63 @@ def test_every_merge_is_the_nearest_pair_of_its_partition(method, distances):
 
 
 @settings(max_examples=150, deadline=None)
-@given(low=st.one_of(TIED, ROUNDED, FREE), seed=st.integers(0, 2**16), tau=st.sampled_from([0, 0.25, 0.5, 1]))
+@given(low=st.one_of(TIED, ROUNDED, FREE, MANY_TIES), seed=st.integers(0, 2**16), tau=TAUS)
 def test_every_fuzzy_merge_is_the_nearest_pair_of_its_partition(low, seed, tau):
     high = low + np.random.default_rng(seed).integers(0, 4, len(low)) * 0.5
     Z = fuzzy_linkage(low, high, tau)
     clips = len(Z) + 1
     assert_greedy(Z, naive.fuzzy_key(naive.square(low, clips), naive.square(high, clips), tau))
+
+
+def assert_is_agglomeration(Z, key, rooted=False):
+    clips = len(Z) + 1
+    for row, (height, clusters) in enumerate(naive.agglomerate(clips, key)):
+        assert naive.partition(Z, clips - 1 - row) == clusters
+        assert Z[row, 2] ** (2 if rooted else 1) == pytest.approx(float(height), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@settings(max_examples=25, deadline=None)
+@given(clips=st.integers(2, 14), seed=st.integers(0, 2**16))
+def test_without_ties_it_is_naive_agglomeration(method, clips, seed):
+    distances = np.random.default_rng(seed).random(math.comb(clips, 2))
+    link, key = METHODS[method]
+    assert_is_agglomeration(link(distances), key(naive.square(distances, clips)), rooted=method == "ward")
+
+
+@settings(max_examples=60, deadline=None)
+@given(clips=st.integers(2, 14), seed=st.integers(0, 2**16), tau=TAUS)
+def test_without_ties_fuzzy_linkage_is_naive_agglomeration(clips, seed, tau):
+    low, width = np.random.default_rng(seed).random((2, math.comb(clips, 2)))
+    key = naive.fuzzy_key(naive.square(low, clips), naive.square(low + width, clips), tau)
+    assert_is_agglomeration(fuzzy_linkage(low, low + width, tau), key)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    clips=st.integers(2, 40),
+    seed=st.integers(0, 2**16),
+    power=st.integers(-500, 250),
+    tau=TAUS,
+)
+def test_neither_unit_nor_order_of_the_clips_matters(clips, seed, power, tau):
+    rng = np.random.default_rng(seed)
+    low = rng.random(math.comb(clips, 2))
+    high = low + rng.random(len(low))
+    order, unit = rng.permutation(clips), 4.0**power
+
+    def shuffled(distances):
+        return unit * squareform(squareform(distances)[np.ix_(order, order)], checks=False)
+
+    links = [(link, (low,)) for link, _ in METHODS.values()] + [
+        (partial(fuzzy_linkage, tau=tau), (low, high))
+    ]
+    for link, ends in links:
+        Z, other = link(*ends), link(*map(shuffled, ends))
+        assert_allclose(other[:, 2], Z[:, 2] * (2.0**power if link is ward_linkage else unit), rtol=1e-13)
+        for kappa in {1, 2, clips // 2 + 1, clips}:
+            renamed = {frozenset(order[list(c)].tolist()) for c in naive.partition(other, kappa)}
+            assert renamed == naive.partition(Z, kappa)
 
 
 @pytest.mark.parametrize("method", METHODS)

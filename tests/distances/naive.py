@@ -3,10 +3,11 @@
 Costs are float64 throughout. Totals of small whole numbers are exact, and so are their ties.
 """
 
-from itertools import combinations
+from decimal import Decimal, localcontext
+from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
 
 THRESHOLDS = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.0)
 
@@ -24,17 +25,32 @@ def dtw_by_enumeration(cost):
     return min((sum(cost[i][j] for i, j in path), len(path)) for path in paths(*np.shape(cost)))
 
 
+def dtw_keys(cost):
+    """(total, cells) of the best path to every cell, by dynamic programming over pairs."""
+    best = {}
+    for i, row in enumerate(np.asarray(cost, dtype=np.float64).tolist()):
+        for j, value in enumerate(row):
+            total, cells = min((best[p] for p in before(i, j) if p in best), default=(0.0, 0))
+            best[i, j] = (total + value, cells + 1)
+    return best
+
+
+def before(i, j):
+    """Where a path may come from, in the order in which a tie is decided."""
+    return (i - 1, j - 1), (i - 1, j), (i, j - 1)
+
+
 def dtw_key(cost):
-    """(total, cells) of the best path, by dynamic programming over pairs."""
     m, n = np.shape(cost)
-    best = {(0, 0): (float(cost[0][0]), 1)}
-    for i in range(m):
-        for j in range(n):
-            if (i, j) != (0, 0):
-                options = [best[p] for p in ((i - 1, j - 1), (i - 1, j), (i, j - 1)) if p in best]
-                total, cells = min(options)
-                best[i, j] = (total + float(cost[i][j]), cells + 1)
-    return best[m - 1, n - 1]
+    return dtw_keys(cost)[m - 1, n - 1]
+
+
+def dtw_path(cost):
+    """The best path that, from its end, steps back in both clips where it can, else in the first."""
+    best, path = dtw_keys(cost), [(np.shape(cost)[0] - 1, np.shape(cost)[1] - 1)]
+    while path[0] != (0, 0):
+        path.insert(0, min((p for p in before(*path[0]) if p in best), key=best.get))
+    return path
 
 
 def dtw(cost):
@@ -70,9 +86,8 @@ def segments(intervals):
     """Index of each interval's segment: intervals with a common frame belong together, transitively."""
     group = list(range(len(intervals)))
     for a, b in combinations(range(len(intervals)), 2):
-        if set(range(intervals[a][0], intervals[a][1] + 1)) & set(
-            range(intervals[b][0], intervals[b][1] + 1)
-        ):
+        (first, last), (start, end) = intervals[a], intervals[b]
+        if first <= end and start <= last and group[a] != group[b]:
             group = [group[a] if g == group[b] else g for g in group]
     return group
 
@@ -106,6 +121,19 @@ def cover_by_integer_programme(edges):
     return sum(w for chosen, (_, _, w) in zip(solution.x, edges, strict=True) if chosen > 0.5)
 
 
+def cover_by_assignment(edges):
+    """The same as an assignment: every node has a copy on the other side, its mate at its cheapest edge."""
+    rows, columns = (sorted({edge[side] for edge in edges}) for side in (0, 1))
+    size = len(rows) + len(columns)
+    costs = np.full((size, size), np.inf)
+    for u, v, weight in edges:
+        r, c = rows.index(u), columns.index(v)
+        for place in ((r, c), (r, len(columns) + r), (len(rows) + c, c)):
+            costs[place] = min(costs[place], weight)
+    costs[len(rows) :, len(columns) :] = 0
+    return costs[linear_sum_assignment(costs)].sum()
+
+
 def segment_edges(cost, threshold):
     """The zones as edges (row segment, column segment, B-DTW)."""
     cost = np.asarray(cost)
@@ -132,7 +160,20 @@ def weighted(values, thresholds=THRESHOLDS):
     return total
 
 
+def distance(f, g):
+    """Euclidean distance of two frames of floats to 60 digits."""
+    with localcontext() as context:
+        context.prec = 60
+        return sum(
+            ((Decimal(float(x)) - Decimal(float(y))) ** 2 for x, y in zip(f, g, strict=True)), Decimal(0)
+        ).sqrt()
+
+
 def euclidean(a, b):
-    return np.array(
-        [[np.sqrt(sum((float(x) - float(y)) ** 2 for x, y in zip(f, g, strict=True))) for g in b] for f in a]
-    )
+    return np.array([[float(distance(f, g)) for g in b] for f in a])
+
+
+def is_path(path, m, n):
+    """Whether the cells lead from corner to corner by the three steps."""
+    steps = {(p - i, q - j) for (i, j), (p, q) in pairwise(path)}
+    return path[0] == (0, 0) and path[-1] == (m - 1, n - 1) and steps <= {(1, 1), (1, 0), (0, 1)}

@@ -1,3 +1,7 @@
+"""Cost matrices: within a few roundings of the exact distance, and a cell from its two frames alone."""
+
+from decimal import Decimal
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,52 +9,106 @@ from hypothesis import strategies as st
 
 from motionary.pipeline.distances import cost_matrix
 from tests.distances import naive
+from tests.distances.strategies import SEEDS, frame_pairs
 
 
-def pair(seed, m, n, d, dtype=np.float32):
-    rng = np.random.default_rng(seed)
-    return rng.normal(size=(m, d)).astype(dtype), rng.normal(size=(n, d)).astype(dtype)
+def roundings_allowed(d):
+    """Error of a cell in units of its dtype's epsilon: d + 2 roundings of the square, and one of its root.
+
+    A difference is rounded once and squared (3 halves of epsilon), d - 1 additions follow (a half each), and
+    the root halves the error of what it is taken of.
+    """
+    return (d + 4) / 4
 
 
-@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float32, 3e-6), (np.float64, 1e-14)])
-@pytest.mark.parametrize("shape", [(1, 1, 1), (3, 5, 59), (16, 17, 54), (33, 2, 4)])
-def test_agrees_with_the_definition(shape, dtype, tolerance):
-    a, b = pair(0, *shape, dtype)
+def worst_error(costs, a, b):
+    """Greatest relative error of a cell in units of epsilon; equal frames must be at exactly 0."""
+    worst = Decimal(0)
+    for (i, j), cost in np.ndenumerate(costs):
+        exact = naive.distance(a[i], b[j])
+        assert cost == 0 or exact > 0
+        if exact > 0:
+            worst = max(worst, abs(Decimal(float(cost)) / exact - 1))
+    return float(worst) / np.finfo(costs.dtype).eps
+
+
+@settings(max_examples=80, deadline=None)
+@given(frame_pairs(longest=8))
+def test_every_cell_is_within_its_roundings(pair):
+    a, b = pair
     costs = cost_matrix(a, b)
-    assert costs.dtype == dtype
-    np.testing.assert_allclose(costs, naive.euclidean(a, b), rtol=tolerance)
+    assert costs.dtype == a.dtype
+    assert worst_error(costs, a, b) <= roundings_allowed(a.shape[1])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("d", [1, 54, 59, 130])
+def test_near_frames_far_from_the_origin_keep_their_digits(d, dtype):
+    # The expansion |f|^2 + |g|^2 - 2 f.g has none left here.
+    rng = np.random.default_rng(d)
+    a = (1e3 + rng.normal(size=(20, d))).astype(dtype)
+    b = np.nextafter(a, dtype(np.inf) * rng.choice([-1, 1], size=a.shape).astype(dtype))
+    b[:, : d // 2] = a[:, : d // 2]
+    assert worst_error(cost_matrix(a, b), a, b) <= roundings_allowed(d)
+    np.testing.assert_array_equal(np.diag(cost_matrix(a, a)), 0)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("d", [1, 3, 59, 130])
+def test_features_near_the_limits_of_their_dtype(d, dtype):
+    largest = np.nextafter(np.sqrt(np.finfo(dtype).max / dtype(5 * d)), dtype(0))
+    signs = np.random.default_rng(d).choice([-1, 1], size=(6, d)).astype(dtype)
+    # The least whose square is a normal number, with room for the roundings.
+    for size in (largest, np.sqrt(np.finfo(dtype).tiny) * dtype(2)):
+        a, b = size * signs, size * signs[::-1]
+        costs = cost_matrix(a, b)
+        assert np.isfinite(costs).all()
+        assert worst_error(costs, a, b) <= roundings_allowed(d)
+    np.testing.assert_array_equal(np.diag(cost_matrix(dtype(1e-44) * signs, dtype(1e-44) * signs)), 0)
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(1, 80), st.integers(1, 80), st.integers(1, 70), st.data())
-def test_a_cell_depends_on_its_two_frames_alone(seed, m, n, d, data):
-    a, b = pair(seed, m, n, d)
+@given(frame_pairs(longest=90), st.data())
+def test_a_cell_depends_on_its_two_frames_alone(pair, data):
+    a, b = pair
     whole = cost_matrix(a, b)
-    rows = data.draw(st.lists(st.integers(0, m - 1), min_size=1, max_size=40))
-    columns = data.draw(st.lists(st.integers(0, n - 1), min_size=1, max_size=40))
-    np.testing.assert_array_equal(cost_matrix(a[rows], b[columns]), whole[np.ix_(rows, columns)])
     np.testing.assert_array_equal(cost_matrix(b, a), whole.T)
+    rows = data.draw(st.lists(st.integers(0, len(a) - 1), min_size=1, max_size=40))
+    columns = data.draw(st.lists(st.integers(0, len(b) - 1), min_size=1, max_size=40))
+    np.testing.assert_array_equal(cost_matrix(a[rows], b[columns]), whole[np.ix_(rows, columns)])
+    row, column = data.draw(st.sampled_from(rows)), data.draw(st.sampled_from(columns))
+    np.testing.assert_array_equal(cost_matrix(a[row : row + 3], b[column:]), whole[row : row + 3, column:])
+    assert cost_matrix(a[[row]], b[[column]]) == whole[row, column] == cost_matrix(b[[column]], a[[row]])
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.integers(1, 130), st.sampled_from([(1, 700), (700, 1), (130, 257), (65, 64)]))
+def test_shape_does_not_change_a_cell(seed, d, shape):
+    rng = np.random.default_rng(seed)
+    a, b = (rng.normal(size=(frames, d)).astype(np.float32) for frames in shape)
+    whole = cost_matrix(a, b)
+    i, j = (int(rng.integers(frames)) for frames in shape)
+    np.testing.assert_array_equal(cost_matrix(a[[i]], b)[0], whole[i])
+    np.testing.assert_array_equal(cost_matrix(b[[j]], a)[0], whole[:, j])
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.integers(1, 70), st.floats(-1e4, 1e4))
-def test_equal_frames_cost_nothing_and_close_ones_keep_their_distance(seed, m, d, offset):
-    a = (pair(seed, m, m, d)[0] + np.float32(offset)).astype(np.float32)
-    np.testing.assert_array_equal(np.diag(cost_matrix(a, a)), 0)
-    moved = a.copy()
-    moved[:, 0] = np.nextafter(a[:, 0], np.float32(np.inf))
-    expected = moved[:, 0].astype(np.float64) - a[:, 0]
-    np.testing.assert_allclose(np.diag(cost_matrix(a, moved)), expected, rtol=1e-6, atol=1e-22)
+@given(frame_pairs(longest=12, dtypes=(np.float32,)))
+def test_float32_is_float64_within_its_roundings(pair):
+    a, b = pair
+    tolerance = (roundings_allowed(a.shape[1]) + 1) * np.finfo(np.float32).eps
+    np.testing.assert_allclose(cost_matrix(a, b), cost_matrix(a.astype(np.float64), b), rtol=tolerance)
 
 
 def test_one_float64_clip_makes_it_float64():
-    a, b = pair(0, 3, 4, 5)
-    assert cost_matrix(a, b.astype(np.float64)).dtype == np.float64
+    a, b = np.ones((3, 5), np.float32), np.zeros((4, 5))
+    assert cost_matrix(a, b).dtype == np.float64
     assert cost_matrix([[0, 0]], [[3, 4]]) == [[5.0]]
 
 
 def test_layout_in_memory_does_not_matter():
-    a, b = pair(1, 12, 9, 59)
+    rng = np.random.default_rng(1)
+    a, b = (rng.normal(size=(frames, 59)).astype(np.float32) for frames in (12, 9))
     np.testing.assert_array_equal(cost_matrix(np.asfortranarray(a), b[::-1])[:, ::-1], cost_matrix(a, b))
 
 

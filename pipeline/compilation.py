@@ -1,0 +1,196 @@
+"""Compiled kernels: made once on a machine before anybody needs them, and never older than their sources.
+
+Numba keeps the machine code of a kernel beside its source, or where NUMBA_CACHE_DIR says, or in the user's
+cache folder. What it leaves to its users is done here:
+
+- Processes that compile at the same time can spoil that cache. An index is read, added to and replaced, and
+  the code is written after it; two processes that add different signatures of one kernel both name their
+  code number 1, and the index of one comes to stand over the code of the other (numba issues 4807, 9348).
+  So one process compiles all kernels, and a lock in the cache folder keeps others out meanwhile.
+- A kernel's code counts as fresh while its own file has the same content. The kernels that are inlined into
+  it may have changed, in a checkout and after an upgrade alike. So what was compiled from other sources is
+  thrown away, all of it, before anything is loaded.
+
+A mark in each cache folder says that every kernel of these very sources is there for this processor.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_MODULES = (
+    "motionary.pipeline.alignment.cotw_kernels",
+    "motionary.pipeline.clustering.linkage_kernels",
+    "motionary.pipeline.distances.pairwise",
+)
+"""One module of each folder that holds kernels of the main job."""
+
+_LOCK = "motionary-kernels.lock"
+_PATIENCE = 600.0  # seconds to wait for another process, which needs some twenty
+_NO_CACHE = 75  # exit status: what is written to stderr is for people
+
+
+class KernelCacheError(RuntimeError):
+    """Compiled kernels cannot be kept; the message says what to do."""
+
+
+def compile_kernels(announce: Callable[[], object]) -> None:
+    """Compile every kernel of the main job, unless that has been done on this machine.
+
+    The work is done by a process of its own: this one may have loaded code of older sources already.
+
+    Parameters
+    ----------
+    announce : callable
+        Called before a compilation, which takes some twenty seconds.
+
+    Raises
+    ------
+    KernelCacheError
+        No folder can be written in which numba could keep the code, or another process has held the lock for
+        ten minutes.
+    RuntimeError
+        The compilation failed; the message is its traceback.
+    """
+    if _compiled(_cache_folders()):
+        return
+    announce()
+    done = subprocess.run(
+        [sys.executable, "-m", "motionary.pipeline.compilation"], capture_output=True, text=True, check=False
+    )
+    if done.returncode == _NO_CACHE:
+        raise KernelCacheError(done.stderr.strip())
+    if done.returncode:
+        raise RuntimeError(f"the kernels could not be compiled:\n{done.stderr}")
+
+
+def _compile_in_this_process() -> None:
+    folders = _cache_folders()
+    with _locked(folders[0], _PATIENCE):
+        if _compiled(folders):
+            return
+        _discard_stale(folders)
+        _call_every_kernel()
+        for folder in folders:
+            (folder / _mark()).write_text(_sources())
+
+
+def _call_every_kernel() -> None:
+    """Call what the main job calls, with its types: features are float32, condensed distances float64."""
+    from motionary.pipeline.alignment import cotw
+    from motionary.pipeline.clustering import complete_linkage, fuzzy_linkage
+    from motionary.pipeline.distances import compare_clips, pairwise_distances
+
+    random = np.random.default_rng(0)
+    clips = [random.random((10, 59), dtype=np.float32) for _ in range(3)]
+    pairs = pairwise_distances(clips, n_jobs=1)
+    compare_clips(clips[:2], clips[2:])
+    complete_linkage(pairs.weighted)
+    fuzzy_linkage(pairs.fuzzy_low, pairs.fuzzy_high)
+    cotw(clips[0], clips[1], segment_length=5, slack=1)
+
+
+@cache
+def _kernels() -> list[Any]:
+    """Load the kernels' modules and return the kernels that they name.
+
+    Raises
+    ------
+    KernelCacheError
+        Numba refuses, since it finds no folder for their code.
+    """
+    from numba.extending import is_jitted
+
+    try:
+        modules = [import_module(name) for name in _MODULES]
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        raise KernelCacheError(
+            f"{platform.node()} has no folder in which compiled kernels could be kept: the installation, the "
+            "user's cache folder and NUMBA_CACHE_DIR cannot be written; set NUMBA_CACHE_DIR to one that can"
+        ) from error
+    return [value for module in modules for value in vars(module).values() if is_jitted(value)]
+
+
+def _cache_folders() -> list[Path]:
+    """Return where numba keeps the kernels' code; nowhere if compilation is switched off."""
+    return sorted({Path(kernel.stats.cache_path) for kernel in _kernels()})
+
+
+@cache
+def _sources() -> str:
+    """Return a digest of the numba version and of every source in the kernels' folders."""
+    import numba
+
+    digest = hashlib.blake2b(numba.__version__.encode(), digest_size=16)
+    for folder in sorted({Path(kernel.py_func.__code__.co_filename).parent for kernel in _kernels()}):
+        for file in sorted(folder.glob("*.py")):
+            digest.update(f"{folder.name}/{file.name}".encode())
+            digest.update(hashlib.blake2b(file.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+@cache
+def _mark() -> str:
+    """Name the mark of this Python and this processor; several may share a cache folder."""
+    from numba.core.registry import cpu_target
+
+    target = repr((sys.implementation.cache_tag, cpu_target.target_context.codegen().magic_tuple()))
+    return f"motionary-{hashlib.blake2b(target.encode(), digest_size=6).hexdigest()}.compiled"
+
+
+def _compiled(folders: Sequence[Path]) -> bool:
+    return all(_content(folder / _mark()) == _sources() for folder in folders)
+
+
+def _discard_stale(folders: Sequence[Path]) -> None:
+    """Remove all code from the folders in which some is of other sources, or of who knows which."""
+    for folder in folders:
+        marks = list(folder.glob("motionary-*.compiled"))
+        if not marks or any(_content(mark) != _sources() for mark in marks):
+            for file in (*folder.glob("*.nbi"), *folder.glob("*.nbc"), *marks):
+                file.unlink(missing_ok=True)
+
+
+def _content(file: Path) -> str | None:
+    try:
+        return file.read_text()
+    except FileNotFoundError:
+        return None
+
+
+@contextmanager
+def _locked(folder: Path, patience: float) -> Iterator[None]:
+    """Hold a lock that ends with this process, however it ends: that of an SQLite file with nothing in it."""
+    with closing(sqlite3.connect(folder / _LOCK, timeout=patience, isolation_level=None)) as lock:
+        try:
+            lock.execute("begin exclusive")
+        except sqlite3.OperationalError as error:
+            raise KernelCacheError(
+                f"cannot lock {folder / _LOCK} ({error}): another process is compiling there, or the file "
+                "system knows no locks; end that process, or set NUMBA_CACHE_DIR to a folder of a local disk"
+            ) from error
+        yield
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends this at once, even where workers ignore it
+    try:
+        _compile_in_this_process()
+    except KernelCacheError as error:
+        print(error, file=sys.stderr)
+        sys.exit(_NO_CACHE)
