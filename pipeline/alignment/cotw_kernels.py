@@ -100,7 +100,8 @@ def _window_powers(signal: FloatArray, least: int, powers: FloatArray) -> None:
             mean[s] += delta / (j + 1)
             squares[s] += delta * (signal[s + j] - mean[s])
         if j >= least:
-            powers[j - least, :within] = squares[:within]
+            for s in range(within):
+                powers[j - least, s] = squares[s]
 
 
 @njit(cache=True, nogil=True)

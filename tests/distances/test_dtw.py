@@ -135,3 +135,11 @@ def test_long_clips_keep_their_precision():
 def test_refuses_what_is_no_cost_matrix(function, cost, message):
     with pytest.raises(ValueError, match=message):
         function(cost)
+
+
+@pytest.mark.parametrize(("over", "rounded"), [((0, 1, 1), 1), ((0, 0, 1), 0), ((0, 1), 1)])
+def test_a_mean_is_rounded_to_the_nearest_quantum_and_halves_up(over, rounded):
+    """Costs just under 1 are kept as multiples of 2^-52."""
+    quanta = 2**52 - 4
+    cost = [[(quanta + one) * 2.0**-52 for one in over]]
+    assert dtw_distance(cost) == (quanta + rounded) * 2.0**-52

@@ -1,5 +1,8 @@
 """A pair's distances have the same bits whatever is compared beside it, and however the work is cut up."""
 
+import os
+import subprocess
+import sys
 from itertools import combinations
 
 import numpy as np
@@ -148,3 +151,27 @@ def test_hundreds_of_clips(d):
     assert by_pair(whole, range(150)) == back
     for place, pair in enumerate(combinations(clips, 2)):
         np.testing.assert_array_equal(whole.curve[place], dtw_curve(cost_matrix(*pair)))
+
+
+DIGEST = """
+import hashlib, numpy as np
+from motionary.pipeline.distances import pairwise_distances
+rng = np.random.default_rng(0)
+clips = [np.cumsum(rng.normal(size=(n, 59)), axis=0).astype(np.float32) for n in (3, 17, 64, 31, 9)]
+result = pairwise_distances(clips, n_jobs=1)
+print(hashlib.sha256(result.dtw.tobytes() + result.curve.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_same_bits_on_older_processors(tmp_path):
+    """With registers of 512, 256 and 128 bits, and with a fused multiply-add in software."""
+    digests = set()
+    for processor in ("", "haswell", "generic"):
+        chosen = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""} if processor else {}
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / processor)} | chosen
+        done = subprocess.run(
+            [sys.executable, "-c", DIGEST], env=environment, capture_output=True, text=True, check=True
+        )
+        digests.add(done.stdout)
+    assert len(digests) == 1
