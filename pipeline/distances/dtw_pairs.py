@@ -51,10 +51,10 @@ def pairwise_dtw(
     arrays = comparable_clips(clips, [f"clips[{i}]" for i in range(len(clips))])
     distances = np.empty(len(arrays) * (len(arrays) - 1) // 2)
 
-    def compare(a: PackedClips, b: PackedClips, upper: bool) -> tuple[NDArray[np.float64]]:
-        return (_compare_packed(a, b, bidirectional, upper),)
+    def compare(a: PackedClips, b: PackedClips, upper: bool) -> list[NDArray[np.float64]]:
+        return [_compare_packed(a, b, bidirectional, upper)]
 
-    compare_all(arrays, jobs, tile, compare, (distances,))
+    compare_all(arrays, jobs, tile, compare, [distances])
     return distances
 
 

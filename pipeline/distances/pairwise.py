@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -85,7 +85,7 @@ def compare_clips(
         empty = np.empty((len(clips_a), len(clips_b), len(lambdas)))
         return _record(empty[..., 0], empty[..., 0], empty, lambdas)
     a, b = pack_clips(clips[: len(clips_a)]), pack_clips(clips[len(clips_a) :])
-    return _record(*_compare_packed(a, b, lambdas, upper=False), lambdas)
+    return _compare_packed(a, b, lambdas, upper=False)
 
 
 def pairwise_distances(
@@ -123,28 +123,40 @@ def pairwise_distances(
     jobs = threads_to_use(n_jobs, tile)
     arrays = comparable_clips(clips, [f"clips[{i}]" for i in range(len(clips))])
     pairs = len(arrays) * (len(arrays) - 1) // 2
-    results = np.empty(pairs), np.empty(pairs), np.empty((pairs, len(lambdas)))
-    compare_all(arrays, jobs, tile, lambda a, b, upper: _compare_packed(a, b, lambdas, upper), results)
-    return _record(*results, lambdas)
+    result = PairwiseDistances(
+        dtw=np.empty(pairs),
+        b_dtw=np.empty(pairs),
+        curve=np.empty((pairs, len(lambdas))),
+        weighted=np.empty(pairs),
+        fuzzy_low=np.empty(pairs),
+        fuzzy_high=np.empty(pairs),
+    )
+
+    def compare(a: PackedClips, b: PackedClips, upper: bool) -> list[NDArray[np.float64]]:
+        return _arrays(_compare_packed(a, b, lambdas, upper))
+
+    compare_all(arrays, jobs, tile, compare, _arrays(result))
+    return result
 
 
 def compare_all(
     clips: list[FloatArray],
     jobs: int,
     tile: int,
-    compare: Callable[[PackedClips, PackedClips, bool], tuple[NDArray[np.float64], ...]],
-    results: tuple[NDArray[np.float64], ...],
+    compare: Callable[[PackedClips, PackedClips, bool], list[NDArray[np.float64]]],
+    results: list[NDArray[np.float64]],
 ) -> None:
-    """Compare comparable clips tile by tile, on `jobs` threads.
+    """Compare comparable clips tile by tile, on `jobs` threads; a thread holds no more than its tile.
 
     `compare` returns (na, nb, ...) arrays of a tile; where its third argument is true the two lists are the
     same and only pairs above the diagonal are taken. They go to their places in the condensed `results`.
     """
     starts = range(0, len(clips), tile)
-    packed = {start: pack_clips(clips[start : start + tile]) for start in starts}
 
     def fill(first: int, second: int) -> None:
-        found = compare(packed[first], packed[second], first == second)
+        a = pack_clips(clips[first : first + tile])
+        b = a if first == second else pack_clips(clips[second : second + tile])
+        found = compare(a, b, first == second)
         for row in range(len(found[0])):
             i = first + row
             skipped = row + 1 if first == second else 0
@@ -153,8 +165,12 @@ def compare_all(
                 result[begin : begin + len(values[row]) - skipped] = values[row, skipped:]
 
     with ThreadPoolExecutor(jobs) as threads:
-        for task in [threads.submit(fill, i, j) for i in starts for j in starts if i <= j]:
-            task.result()
+        try:
+            for task in [threads.submit(fill, i, j) for i in starts for j in starts if i <= j]:
+                task.result()
+        except BaseException:
+            threads.shutdown(cancel_futures=True)
+            raise
 
 
 def comparable_clips(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[FloatArray]:
@@ -210,16 +226,20 @@ def _record(
     )
 
 
+def _arrays(record: PairwiseDistances) -> list[NDArray[np.float64]]:
+    return [getattr(record, field.name) for field in fields(record)]
+
+
 def _compare_packed(
     a: PackedClips, b: PackedClips, thresholds: NDArray[np.float64], upper: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return DTW, B-DTW and curve of a tile, zero where `upper` leaves a pair out."""
+) -> PairwiseDistances:
+    """Compare the clips of a tile; distances are zero where `upper` leaves a pair out."""
     shape = len(a.frames), len(b.frames)
     dtw, b_dtw, curve = np.zeros(shape), np.zeros(shape), np.zeros((*shape, len(thresholds)))
     work = make_workspace(*largest_pair(a, b))
     room = room_for_costs(a, b)
     _fill_tile(a, b, thresholds, upper, room, work, dtw, b_dtw, curve)
-    return dtw, b_dtw, curve
+    return _record(dtw, b_dtw, curve, thresholds)
 
 
 def largest_pair(a: PackedClips, b: PackedClips) -> tuple[int, int]:

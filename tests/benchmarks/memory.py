@@ -57,13 +57,8 @@ class Peak:
 
     @property
     def beyond(self) -> int:
-        """What was held besides the result: the clips as the kernels read them, scratch, a tile."""
+        """What was held besides the result: a tile, with its clips as the kernels read them, and scratch."""
         return self.peak - self.result
-
-    @property
-    def beyond_copies(self) -> int:
-        """What is left of that without two copies of the clips, as rows and as columns."""
-        return self.beyond - 2 * self.inputs
 
 
 def measure_memory(clips: ClipSet, folder: Path, quick: bool) -> list[Peak]:

@@ -67,10 +67,7 @@ def as_record(results: Results) -> dict:
         "limits": asdict(results.limits),
         "agreement": [asdict(one) | {"holds": one.holds} for one in results.agreements],
         "growth": [_grown(stage) for stage in results.growth],
-        "memory": [
-            asdict(peak) | {"beyond": peak.beyond, "beyond_copies": peak.beyond_copies}
-            for peak in results.peaks
-        ],
+        "memory": [asdict(peak) | {"beyond": peak.beyond} for peak in results.peaks],
     }
 
 

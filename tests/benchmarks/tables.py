@@ -24,9 +24,8 @@ def print_tables(record: dict, console: Console) -> None:
     _show(console, *_growth(record))
     _show(console, *_memory(record))
     console.print(
-        "Beyond the result are the clips as the kernels read them (rows and columns: two copies), a thread's "
-        "scratch (by the cells of its largest matrix) and one tile. Without the copies, what is left is "
-        "negative where they are given back before the last arrays of the result are made.",
+        "Beyond the result is one tile: its distances, its clips as the kernels read them (rows and lanes), "
+        "and scratch by the cells of its largest matrix.",
         highlight=False,
     )
     _show(console, *_agreement(record))
@@ -139,17 +138,14 @@ def _growth(record: dict) -> tuple[str, Table]:
 
 def _memory(record: dict) -> tuple[str, Table]:
     title = f"Peak memory above that before the call, MB, one thread ({record['memory'][0]['method']})"
-    columns = ("task", "clips", "frames", "clips' own", "peak", "result", "beyond it", "without two copies")
+    columns = ("task", "clips", "frames", "clips' own", "peak", "result", "beyond it")
     table = _table(*columns)
     for row in record["memory"]:
         table.add_row(
             TASK_NAMES[row["task"]],
             str(row["clips"]),
             str(row["frames"]),
-            *(
-                f"{row[name] / MEGABYTE:.2f}"
-                for name in ("inputs", "peak", "result", "beyond", "beyond_copies")
-            ),
+            *(f"{row[name] / MEGABYTE:.2f}" for name in ("inputs", "peak", "result", "beyond")),
         )
     return title, table
 

@@ -1,6 +1,7 @@
 """All pairs: their order, their definition, and what is refused. Their bits: `test_same_bits.py`."""
 
 import dataclasses
+import time
 from itertools import combinations
 
 import numpy as np
@@ -18,6 +19,7 @@ from motionary.pipeline.distances import (
     random_thresholds,
     weighted_distance,
 )
+from motionary.pipeline.distances.pairwise import compare_all
 from tests.distances import naive
 from tests.distances.strategies import clip_lists
 
@@ -122,3 +124,16 @@ def test_names_the_clip_at_fault(broken, message):
 def test_refuses_settings_out_of_range(setting):
     with pytest.raises(ValueError, match="must"):
         pairwise_distances(walks(9, [3, 4]), **setting)
+
+
+def test_a_tile_that_fails_stops_the_rest():
+    calls = []
+
+    def compare(a, b, upper):
+        calls.append(upper)
+        time.sleep(0.01)
+        raise MemoryError("no room for this tile")
+
+    with pytest.raises(MemoryError, match="no room"):
+        compare_all(walks(11, [2] * 20), 1, 1, compare, [])
+    assert len(calls) < 20
