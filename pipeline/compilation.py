@@ -1,4 +1,4 @@
-"""Compiled kernels: made once on a machine before anybody needs them, and never older than their sources.
+"""Compiled kernels: made once on a machine before a job needs them, and never older than their sources.
 
 Numba keeps the machine code of a kernel beside its source, or where NUMBA_CACHE_DIR says, or in the user's
 cache folder. What it leaves to its users is done here:
@@ -36,7 +36,7 @@ _MODULES = (
     "motionary.pipeline.clustering.linkage_kernels",
     "motionary.pipeline.distances.pairwise",
 )
-"""One module of each folder that holds kernels of the main job."""
+"""One module of each folder that holds kernels of the main job, naming some of them."""
 
 _LOCK = "motionary-kernels.lock"
 _PATIENCE = 600.0  # seconds to wait for another process, which needs some twenty

@@ -99,6 +99,7 @@ class DistanceConfig:
 
     def __post_init__(self) -> None:
         _one_of("thresholds", self.thresholds, ("midpoints", "random"))
+        _at_least("seed", self.seed, 0)
         _at_least("tile", self.tile, 1)
 
 

@@ -23,6 +23,9 @@ from motionary.pipeline.distances.kernel import kernel
 from motionary.pipeline.distances.lanes import LANES, ROWS, WORD, fill_block, padded
 from motionary.pipeline.motion import FloatArray
 
+# Half of the range: a greater one could be rounded up to infinity.
+GREATEST_COST = 2.0**1023
+
 
 class PackedClips(NamedTuple):
     """Clips laid out for `frame_distances`, as rows and as lanes, filled up by copies of their last frames.
@@ -112,7 +115,7 @@ def checked_clips(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[Floa
 
 
 def checked_costs(cost: ArrayLike) -> NDArray[np.float64]:
-    """Convert a cost matrix to float64 and check it: two-dimensional, not empty, finite, not negative.
+    """Convert a cost matrix to float64 and check it: two-dimensional, not empty, from 0 to 2^1023.
 
     Raises
     ------
@@ -122,12 +125,12 @@ def checked_costs(cost: ArrayLike) -> NDArray[np.float64]:
     costs = np.ascontiguousarray(cost, dtype=np.float64)
     if costs.ndim != 2 or costs.size == 0:
         raise ValueError(f"cost has shape {costs.shape}; a cost matrix is (m, n) with at least one cell")
-    fits = np.isfinite(costs) & (costs >= 0)
+    fits = (costs >= 0) & (costs <= GREATEST_COST)
     if not fits.all():
         row, column = np.argwhere(~fits)[0]
         raise ValueError(
             f"cost holds {costs[row, column]} at row {row}, column {column}; "
-            "costs are finite and not negative"
+            "costs are finite and not negative, and at most 2^1023"
         )
     return costs
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from motionary.pipeline.distances.cost import PackedClips
 from motionary.pipeline.distances.fixed_point import length_bits_of, mean_quanta, pack, quantum_of
 from motionary.pipeline.distances.kernel import kernel
-from motionary.pipeline.distances.pairwise import (
+from motionary.pipeline.distances.recurrence import both_ways, forward
+from motionary.pipeline.distances.tiles import (
     comparable_clips,
     compare_all,
     largest_pair,
@@ -18,7 +19,6 @@ from motionary.pipeline.distances.pairwise import (
     room_for_costs,
     threads_to_use,
 )
-from motionary.pipeline.distances.recurrence import both_ways, forward
 
 
 def pairwise_dtw(
@@ -52,24 +52,25 @@ def pairwise_dtw(
     distances = np.empty(len(arrays) * (len(arrays) - 1) // 2)
 
     def compare(a: PackedClips, b: PackedClips, upper: bool) -> list[NDArray[np.float64]]:
-        return [_compare_packed(a, b, bidirectional, upper)]
+        return [_compare_by_dtw(a, b, bidirectional, upper)]
 
     compare_all(arrays, jobs, tile, compare, [distances])
     return distances
 
 
-def _compare_packed(a: PackedClips, b: PackedClips, bidirectional: bool, upper: bool) -> NDArray[np.float64]:
+def _compare_by_dtw(a: PackedClips, b: PackedClips, bidirectional: bool, upper: bool) -> NDArray[np.float64]:
     """Return DTW or B-DTW of a tile, zero where `upper` leaves a pair out."""
     distances = np.zeros((len(a.frames), len(b.frames)))
-    room = room_for_costs(a, b)
+    rows, columns = largest_pair(a, b, upper)
+    room = room_for_costs(rows, columns, a.rows.dtype)
     words = np.empty(len(room.costs), dtype=np.int64)
-    rows_of_totals = np.empty((2, max(largest_pair(a, b))), dtype=np.int64)
-    _fill_tile(a, b, bidirectional, upper, room, words, rows_of_totals, distances)
+    rows_of_totals = np.empty((2, columns), dtype=np.int64)
+    _fill_dtw_tile(a, b, bidirectional, upper, room, words, rows_of_totals, distances)
     return distances
 
 
 @kernel
-def _fill_tile(a, b, bidirectional, upper, room, words, totals, distances):  # type: ignore[no-untyped-def]
+def _fill_dtw_tile(a, b, bidirectional, upper, room, words, totals, distances):  # type: ignore[no-untyped-def]
     """Compare every clip of `a` with every clip of `b`, or with those of higher index alone (`upper`)."""
     for p in range(len(a.frames)):
         for q in range(p + 1 if upper else 0, len(b.frames)):

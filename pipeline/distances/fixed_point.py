@@ -23,7 +23,7 @@ import numpy as np
 
 from motionary.pipeline.distances.kernel import kernel
 
-# Above every word and every total; the sum of two is still a 64-bit integer.
+# Above every total; with one total added it is still a 64-bit integer, but not twice itself.
 UNREACHED = 1 << 62
 # A 64-bit float holds integers, and integers and a half, exactly below this power of two.
 MOST_VALUE_BITS = 52
@@ -57,7 +57,7 @@ def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
     if largest == 0:
         return 1.0
     value_bits = min(MOST_VALUE_BITS, 62 - 2 * length_bits)
-    # Below 2^-960 the reciprocal would overflow; costs that small are rounded more coarsely.
+    # Well above 2^-1022, so that one over it stays finite; smaller costs are rounded more coarsely.
     return math.ldexp(1.0, max(math.frexp(largest)[1] - value_bits, -960))
 
 

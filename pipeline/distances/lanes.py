@@ -63,7 +63,7 @@ def _fill_block(typingctx: Any, rows: Any, i: Any, lanes: Any, block: Any, out: 
             others = _load(builder, lanes, builder.add(begin, builder.mul(loop.index, i.type(LANES))), lane)
             for row, total in zip(row_numbers, sums, strict=True):
                 place = builder.add(builder.mul(row, depth), loop.index)
-                value = _in_every_lane(builder, builder.load(builder.gep(rows.data, [place])), lane)
+                value = _in_every_place(builder, builder.load(builder.gep(rows.data, [place])), lane)
                 difference = builder.fsub(others, value)
                 fused = _call(builder, "fma", lane, [difference, difference, builder.load(total)])
                 builder.store(fused, total)
@@ -89,7 +89,7 @@ def _bits_at_most(typingctx: Any, costs: Any, place: Any, limit: Any) -> Any:
         costs = context.make_array(signature.args[0])(context, builder, arguments[0])
         word = ir.VectorType(context.get_data_type(signature.args[0].dtype), WORD)
         kept = builder.fcmp_ordered(
-            "<=", _load(builder, costs, arguments[1], word), _in_every_lane(builder, arguments[2], word)
+            "<=", _load(builder, costs, arguments[1], word), _in_every_place(builder, arguments[2], word)
         )
         return builder.bitcast(kept, ir.IntType(WORD))
 
@@ -114,30 +114,30 @@ def _lane_type(context: Any, array: Any) -> ir.VectorType:
     return ir.VectorType(context.get_data_type(array.dtype), LANES)
 
 
-def _load(builder: Any, array: Any, place: Any, lane: ir.VectorType) -> Any:
-    loaded = builder.load(builder.bitcast(builder.gep(array.data, [place]), lane.as_pointer()))
-    loaded.align = _bytes(lane)
+def _load(builder: Any, array: Any, place: Any, vector: ir.VectorType) -> Any:
+    loaded = builder.load(builder.bitcast(builder.gep(array.data, [place]), vector.as_pointer()))
+    loaded.align = _element_bytes(vector)
     return loaded
 
 
 def _store(builder: Any, value: Any, array: Any, place: Any) -> None:
     stored = builder.store(value, builder.bitcast(builder.gep(array.data, [place]), value.type.as_pointer()))
-    stored.align = _bytes(value.type)
+    stored.align = _element_bytes(value.type)
 
 
-def _bytes(lane: ir.VectorType) -> int:
-    return 4 if isinstance(lane.element, ir.FloatType) else 8
+def _element_bytes(vector: ir.VectorType) -> int:
+    return 4 if isinstance(vector.element, ir.FloatType) else 8
 
 
-def _in_every_lane(builder: Any, value: Any, lane: ir.VectorType) -> Any:
-    nothing = ir.Constant(lane, ir.Undefined)
+def _in_every_place(builder: Any, value: Any, vector: ir.VectorType) -> Any:
+    nothing = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(nothing, value, _INDEX(0))
-    return builder.shuffle_vector(first, nothing, ir.VectorType(_INDEX, lane.count)([0] * lane.count))
+    return builder.shuffle_vector(first, nothing, ir.VectorType(_INDEX, vector.count)([0] * vector.count))
 
 
-def _call(builder: Any, name: str, lane: ir.VectorType, operands: list[Any]) -> Any:
-    kind = f"v{LANES}f{8 * _bytes(lane)}"
-    signature = ir.FunctionType(lane, [lane] * len(operands))
+def _call(builder: Any, name: str, vector: ir.VectorType, operands: list[Any]) -> Any:
+    kind = f"v{vector.count}f{8 * _element_bytes(vector)}"
+    signature = ir.FunctionType(vector, [vector] * len(operands))
     return builder.call(
         cgutils.get_or_insert_function(builder.module, signature, f"llvm.{name}.{kind}"), operands
     )

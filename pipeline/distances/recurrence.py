@@ -18,7 +18,7 @@ import numpy as np
 from motionary.pipeline.distances.fixed_point import UNREACHED
 from motionary.pipeline.distances.kernel import kernel
 
-NONE, ONE = np.uint64(0), np.uint64(1)
+ZERO, ONE = np.uint64(0), np.uint64(1)
 
 
 @kernel
@@ -32,7 +32,7 @@ def both_ways(words, width, top, bottom, left, right, ahead, back, pitch):  # ty
     down, rows, columns = np.uint64(width), np.uint64(bottom - top + 1), np.uint64(right - left + 1)
     first, last = np.uint64(top * width + left), np.uint64(bottom * width + left)
     return _side_by_side(
-        words, first, down, last, NONE - down, ONE, rows, columns, ahead, back, np.uint64(pitch)
+        words, first, down, last, ZERO - down, ONE, rows, columns, ahead, back, np.uint64(pitch)
     )
 
 
@@ -46,7 +46,7 @@ def forward(words, width, top, bottom, left, right, ahead, back):  # type: ignor
 @kernel
 def backward(words, width, top, bottom, left, right, ahead, back):  # type: ignore[no-untyped-def]
     """Least total of a rectangle (inclusive), from its bottom left to its top right."""
-    up, start, end = NONE - np.uint64(width), np.uint64(bottom * width + left), np.uint64(top * width + right)
+    up, start, end = ZERO - np.uint64(width), np.uint64(bottom * width + left), np.uint64(top * width + right)
     return _from_both_ends(words, start, end, up, bottom - top + 1, right - left + 1, ahead, back)
 
 
@@ -58,8 +58,8 @@ def _from_both_ends(words, start, end, row_step, rows, columns, ahead, back):  #
     """
     half, last = (rows + 1) // 2, columns - 1
     _side_by_side(
-        words, start, row_step, end, NONE - row_step, NONE - ONE,
-        np.uint64(half), np.uint64(columns), ahead, back, NONE,
+        words, start, row_step, end, ZERO - row_step, ZERO - ONE,
+        np.uint64(half), np.uint64(columns), ahead, back, ZERO,
     )  # fmt: skip
     least = UNREACHED
     if rows % 2:
@@ -79,7 +79,8 @@ def _side_by_side(words, start_a, row_a, start_b, row_b, column_b, rows, columns
     """Run two recurrences over `rows` rows and `columns` columns; return T at the last cell of each.
 
     The first takes its columns forward, the second as `column_b` says: every value less in the inner loop is
-    one less that the processor's sixteen registers must hold.
+    one less that the processor's sixteen registers must hold. Row r of T goes to `a` and `b` from place
+    r * pitch, where the row below it reads it; with pitch 0 each row overwrites the one above it.
     """
     total_a = total_b = np.int64(0)
     here_b = start_b
@@ -88,7 +89,7 @@ def _side_by_side(words, start_a, row_a, start_b, row_b, column_b, rows, columns
         total_b += words[here_b]
         a[j], b[j] = total_a, total_b
         here_b += column_b
-    above = NONE
+    above = ZERO
     for _ in range(ONE, rows):
         start_a += row_a
         start_b += row_b

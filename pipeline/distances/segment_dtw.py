@@ -138,7 +138,8 @@ def segment_dtw_distance(cost: ArrayLike, threshold: float) -> float:
     m, n = costs.shape
     refuse_too_long(m, n)
     low, high = costs.min(), costs.max()
-    limit = limit_of(low, high, *checked_thresholds([threshold]))
+    (value,) = checked_thresholds([threshold])
+    limit = limit_of(low, high, value)
     work = make_workspace(m, n)
     filled = filled_up(costs)
     _, _, quantum, length_bits = prepare(filled, m, n, high, work)
@@ -195,6 +196,7 @@ def _weight(top, bottom, left, right, rows, width, length_bits, work):  # type: 
     if from_first and from_last:
         ahead, back = work.ahead[bottom * width + right], work.back[bottom * width + right]
         return min(mean_quanta(ahead, length_bits), mean_quanta(back, length_bits))
+    # Another zone of the same place overwrites: what that costs is a computation.
     place = (top * 31 + bottom * 37 + left * 41 + right * 43) % REMEMBERED
     known = work.known_zones[place]
     if known[0] == top and known[1] == bottom and known[2] == left and known[3] == right:

@@ -71,7 +71,7 @@ def checked_thresholds(thresholds: ArrayLike) -> NDArray[np.float64]:
 
 
 def most_zones(rows: int, columns: int) -> int:
-    """Return an upper bound on regions, and on runs that touch none above: their first cells never touch."""
+    """Return an upper bound on sets: of any two by two cells, at most one begins a set."""
     return -(-rows // 2) * -(-columns // 2)
 
 
@@ -89,7 +89,8 @@ def bit_words(columns):  # type: ignore[no-untyped-def]
 @kernel
 def limit_of(low, high, threshold):  # type: ignore[no-untyped-def]
     """Delta of a threshold lambda (eq. 6)."""
-    return high if threshold == 1.0 else low + threshold * (high - low)
+    least, greatest = np.float64(low), np.float64(high)
+    return greatest if threshold == 1.0 else least + threshold * (greatest - least)
 
 
 @kernel
@@ -178,7 +179,10 @@ def _representative(parents, member):  # type: ignore[no-untyped-def]
 
 @kernel
 def _join(parents, zones, a, b):  # type: ignore[no-untyped-def]
-    """Join two sets, given by their representatives; return the joined set's."""
+    """Join two sets, given by their representatives; return the joined set's.
+
+    The last row is left: who joins is at a row below, and sets it.
+    """
     if a == b:
         return a
     kept, gone = min(a, b), max(a, b)

@@ -9,7 +9,7 @@ from tests.benchmarks.contests import TASK_NAMES
 
 # Wide enough for every table, also where the output is no terminal.
 WIDTH = 124
-MEGABYTE = 2**20
+MEBIBYTE = 2**20
 
 
 def print_tables(record: dict, console: Console) -> None:
@@ -29,11 +29,14 @@ def print_tables(record: dict, console: Console) -> None:
         highlight=False,
     )
     _show(console, *_agreement(record))
-    _show(console, *_targets(record))
+    if not record["settings"]["quick"]:
+        _show(console, *_targets(record))
 
 
 def _print_setting(record: dict, console: Console) -> None:
     machine, settings = record["machine"], record["settings"]
+    if settings["quick"]:
+        console.print("A quick run, to see that it runs: its figures mean nothing.", highlight=False)
     peers = record["peers"] or {}
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
     console.print(
@@ -137,7 +140,7 @@ def _growth(record: dict) -> tuple[str, Table]:
 
 
 def _memory(record: dict) -> tuple[str, Table]:
-    title = f"Peak memory above that before the call, MB, one thread ({record['memory'][0]['method']})"
+    title = f"Peak memory above that before the call, MiB, one thread ({record['memory'][0]['method']})"
     columns = ("task", "clips", "frames", "clips' own", "peak", "result", "beyond it")
     table = _table(*columns)
     for row in record["memory"]:
@@ -145,7 +148,7 @@ def _memory(record: dict) -> tuple[str, Table]:
             TASK_NAMES[row["task"]],
             str(row["clips"]),
             str(row["frames"]),
-            *(f"{row[name] / MEGABYTE:.2f}" for name in ("inputs", "peak", "result", "beyond")),
+            *(f"{row[name] / MEBIBYTE:.2f}" for name in ("inputs", "peak", "result", "beyond")),
         )
     return title, table
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionary.pipeline.distances import cost_matrix
+from motionary.pipeline.distances import cost_matrix, dtw_distance
 from tests.distances import naive
 from tests.distances.strategies import SEEDS, frame_pairs
 
@@ -127,3 +127,9 @@ def test_layout_in_memory_does_not_matter():
 def test_refuses_what_cannot_be_compared(a, b, message):
     with pytest.raises(ValueError, match=message):
         cost_matrix(a, b)
+
+
+def test_a_cost_that_could_be_rounded_to_infinity_is_refused():
+    assert dtw_distance([[2.0**1023]]) == 2.0**1023
+    with pytest.raises(ValueError, match=r"holds 1\.79.*e\+308 at row 0, column 1; .* at most 2\^1023"):
+        dtw_distance([[1.0, np.finfo(float).max]])

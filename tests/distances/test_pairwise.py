@@ -1,6 +1,9 @@
 """All pairs: their order, their definition, and what is refused. Their bits: `test_same_bits.py`."""
 
 import dataclasses
+import os
+import subprocess
+import sys
 import time
 from itertools import combinations
 
@@ -16,10 +19,11 @@ from motionary.pipeline.distances import (
     dtw_curve,
     dtw_distance,
     pairwise_distances,
+    pairwise_dtw,
     random_thresholds,
     weighted_distance,
 )
-from motionary.pipeline.distances.pairwise import compare_all
+from motionary.pipeline.distances.tiles import compare_all
 from tests.distances import naive
 from tests.distances.strategies import clip_lists
 
@@ -137,3 +141,20 @@ def test_a_tile_that_fails_stops_the_rest():
     with pytest.raises(MemoryError, match="no room"):
         compare_all(walks(11, [2] * 20), 1, 1, compare, [])
     assert len(calls) < 20
+
+
+def test_one_long_clip_needs_no_room_for_itself():
+    """A matrix of the long clip against itself would take 16 GB a byte."""
+    long, short = np.ones((2**17, 1), np.float32), np.zeros((3, 1), np.float32)
+    assert pairwise_distances([long, short]).weighted[0] == pytest.approx(weighted_distance([1.0] * 8))
+    assert pairwise_dtw([long, short, short])[0] == 1
+    assert pairwise_distances([long], tile=1).dtw.shape == (0,)
+
+
+def test_compilation_switched_off_is_refused():
+    done = subprocess.run(
+        [sys.executable, "-c", "from motionary.pipeline.distances import dtw_distance"],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert "NUMBA_DISABLE_JIT is set" in done.stderr

@@ -117,12 +117,14 @@ def test_costs_of_very_different_size_in_one_tile(clips, which):
 @given(SEEDS, st.sampled_from([-1, 0, 1]))
 def test_costs_beside_delta_are_told_from_it(seed, above):
     """A float32 cost next to delta, which is a float64, lies above it or not: nothing is rounded between."""
-    largest = np.float32(np.random.default_rng(seed).uniform(1, 2))
-    delta = [np.float32(threshold * float(largest)) for threshold in THRESHOLDS[:7]]
+    rng = np.random.default_rng(seed)
+    least, largest = np.float32(rng.choice([0, rng.uniform(0, 0.1)])), np.float32(rng.uniform(1, 2))
+    span = float(largest) - float(least)
+    delta = [np.float32(float(least) + threshold * span) for threshold in THRESHOLDS[:7]]
     beside = np.array([value + above * np.spacing(value) for value in delta])
     for cost in beside:
         # On a line from 0: a zone at the least cost, a high cell, and another zone or none beside delta.
-        row = np.array([[0, largest, cost, largest, 0]]).T.astype(np.float32)
+        row = np.array([[least, largest, cost, largest, least]]).T.astype(np.float32)
         result = pairwise_distances([np.zeros((1, 1), np.float32), row])
         np.testing.assert_allclose(result.curve[0], naive.curve(row.T), rtol=1e-12)
         np.testing.assert_array_equal(result.curve[0], dtw_curve(row.T))
