@@ -22,7 +22,7 @@ from motionary.pipeline.distances.tiles import (
 
 
 def pairwise_dtw(
-    clips: Sequence[ArrayLike], n_jobs: int | None = None, bidirectional: bool = False, tile: int = 64
+    clips: Sequence[ArrayLike], n_jobs: int | None = None, bidirectional: bool = False, tile: int = 128
 ) -> NDArray[np.float64]:
     """Compare every clip with every later one by DTW, or by B-DTW: a fraction of the curve's time.
 

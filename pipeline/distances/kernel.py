@@ -26,8 +26,9 @@ _SOURCES = hashlib.blake2b(
 
 def kernel(function: Callable) -> Any:
     """Compile a function when it is first called, or take the code kept from these very sources."""
-    compiled: Any = njit(**_OPTIONS)(function)
+    compiled = njit(**_OPTIONS)(function)
     if not isinstance(compiled, Dispatcher):
         raise RuntimeError("NUMBA_DISABLE_JIT is set, and the distances exist as machine code only; unset it")
-    compiled._cache._cache_file._source_stamp = _SOURCES
-    return compiled
+    kept: Any = compiled
+    kept._cache._cache_file._source_stamp = _SOURCES
+    return kept
