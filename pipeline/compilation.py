@@ -127,7 +127,7 @@ def _kernels() -> list[Any]:
 
 
 def _cache_folders() -> list[Path]:
-    """Return where numba keeps the kernels' code; nowhere if compilation is switched off."""
+    """Return where numba keeps the kernels' code."""
     return sorted({Path(kernel.stats.cache_path) for kernel in _kernels()})
 
 

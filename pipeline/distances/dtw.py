@@ -18,10 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from motionary.pipeline.distances.cost import checked_costs
 from motionary.pipeline.distances.fixed_point import (
     UNREACHED,
-    length_bits_of,
     mean_quanta,
     pack,
-    quantum_of,
     refuse_too_long,
 )
 from motionary.pipeline.distances.kernel import kernel
@@ -102,10 +100,8 @@ def packed_costs(costs: NDArray[np.float64]) -> tuple[NDArray[np.int64], float, 
     """Pack checked costs into words (m, n); return them, their quantum and the bits of a path's length."""
     m, n = costs.shape
     refuse_too_long(m, n)
-    length_bits = length_bits_of(m, n)
-    quantum = quantum_of(costs.max(), length_bits)
     words = np.empty(m * n, dtype=np.int64)
-    pack(costs.ravel(), quantum, length_bits, words)
+    quantum, length_bits = pack(costs.ravel(), m, n, costs.max(), words)
     return words.reshape(m, n), quantum, length_bits
 
 

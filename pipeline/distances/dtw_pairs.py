@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motionary.pipeline.distances.cost import PackedClips
-from motionary.pipeline.distances.fixed_point import length_bits_of, mean_quanta, pack, quantum_of
+from motionary.pipeline.distances.fixed_point import mean_quanta, pack
 from motionary.pipeline.distances.kernel import kernel
 from motionary.pipeline.distances.recurrence import both_ways, forward
 from motionary.pipeline.distances.tiles import (
@@ -75,9 +75,7 @@ def _fill_dtw_tile(a, b, bidirectional, upper, room, words, totals, distances): 
     for p in range(len(a.frames)):
         for q in range(p + 1 if upper else 0, len(b.frames)):
             m, n, _, width, _, high = pair_costs(a, p, b, q, room)
-            length_bits = length_bits_of(m, n)
-            quantum = quantum_of(high, length_bits)
-            pack(room.costs, quantum, length_bits, words[: m * width])
+            quantum, length_bits = pack(room.costs, m, n, high, words[: m * width])
             if bidirectional:
                 ahead, back = both_ways(words, width, 0, m - 1, 0, n - 1, totals[0], totals[1], 0)
                 least = min(mean_quanta(ahead, length_bits), mean_quanta(back, length_bits))

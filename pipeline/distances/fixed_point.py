@@ -43,7 +43,7 @@ def refuse_too_long(rows: int, columns: int) -> None:
 
 
 @kernel
-def length_bits_of(frames_a, frames_b):  # type: ignore[no-untyped-def]
+def _length_bits(frames_a, frames_b):  # type: ignore[no-untyped-def]
     """Bits that hold the number of cells of the longest path, m + n - 1."""
     bits = 1
     while (frames_a + frames_b - 1) >> bits:
@@ -52,7 +52,7 @@ def length_bits_of(frames_a, frames_b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
+def _quantum(largest, length_bits):  # type: ignore[no-untyped-def]
     """Power of two that brings the largest cost just under 2^value_bits."""
     if largest == 0:
         return 1.0
@@ -62,20 +62,20 @@ def quantum_of(largest, length_bits):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pack(costs, quantum, length_bits, words):  # type: ignore[no-untyped-def]
-    """Fill `words` (cells,) int64 from `costs` (cells,)."""
+def pack(costs, m, n, greatest, words):  # type: ignore[no-untyped-def]
+    """Fill `words` (cells,) int64 from `costs` (cells,) of clips of m and n frames, none above `greatest`.
+
+    Returns the quantum and the bits of a path's length.
+    """
+    length_bits = _length_bits(m, n)
+    quantum = _quantum(greatest, length_bits)
     per_quantum = 1.0 / quantum
     for cell in range(len(words)):
-        words[cell] = word_of(costs[cell], per_quantum, length_bits)
-
-
-@kernel
-def word_of(cost, per_quantum, length_bits):  # type: ignore[no-untyped-def]
-    """Pack one cost; `per_quantum` is one over the quantum."""
-    # Adding 2^52 rounds to the nearest integer, which then stands in the low bits: few processors convert
-    # several floats to 64-bit integers at once, all add them.
-    rounded = np.float64(cost * per_quantum + INTEGERS).view(np.int64)
-    return ((rounded - INTEGER_BITS) << length_bits) + 1
+        # Adding 2^52 rounds to the nearest integer, which then stands in the low bits: few processors convert
+        # several floats to 64-bit integers at once, all add them.
+        rounded = np.float64(costs[cell] * per_quantum + INTEGERS).view(np.int64)
+        words[cell] = ((rounded - INTEGER_BITS) << length_bits) + 1
+    return quantum, length_bits
 
 
 @kernel

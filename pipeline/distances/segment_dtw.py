@@ -20,10 +20,8 @@ from motionary.pipeline.distances.cost import checked_costs, filled_up
 from motionary.pipeline.distances.edge_cover import CoverRoom, cover_room, least_cover
 from motionary.pipeline.distances.fixed_point import (
     UNREACHED,
-    length_bits_of,
     mean_quanta,
     pack,
-    quantum_of,
     refuse_too_long,
 )
 from motionary.pipeline.distances.kernel import kernel
@@ -153,10 +151,8 @@ def prepare(costs, m, n, high, work):  # type: ignore[no-untyped-def]
     Returns the means of both directions in quanta, the quantum and the bits of a length.
     """
     width = costs.shape[1]
-    length_bits = length_bits_of(m, n)
-    quantum = quantum_of(high, length_bits)
     words = work.words[: m * width]
-    pack(costs.reshape(costs.size), quantum, length_bits, words)
+    quantum, length_bits = pack(costs.reshape(costs.size), m, n, high, words)
     ahead, back = both_ways(words, width, 0, m - 1, 0, n - 1, work.ahead, work.back, width)
     work.known_zones[:] = -1
     return mean_quanta(ahead, length_bits), mean_quanta(back, length_bits), quantum, length_bits
