@@ -11,6 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def places_of(first: NDArray[np.int64], second: NDArray[np.int64], clips: int) -> NDArray[np.int64]:
+    """Return where pairs stand, given by the places of their clips, first < second."""
+    return first * clips - first * (first + 1) // 2 + second - first - 1
+
+
 def clip_count(condensed: NDArray[np.floating]) -> int:
     """Return N for a condensed array of N(N-1)/2 distances; none at all means one clip.
 
@@ -66,6 +71,6 @@ def clips_of(pair: int, clips: int) -> str:
 def distances_of(clip: int, condensed: NDArray[np.float64], clips: int) -> NDArray[np.float64]:
     """Return the row (N,) of one clip: its distance to every clip, infinite to itself."""
     before = np.arange(clip)
-    above = before * clips - before * (before + 1) // 2 + clip - before - 1
+    above = places_of(before, np.full(clip, clip), clips)
     start = clip * clips - clip * (clip + 1) // 2
     return np.concatenate([condensed[above], [np.inf], condensed[start : start + clips - clip - 1]])

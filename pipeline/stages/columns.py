@@ -9,6 +9,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from motionary.pipeline.clustering.condensed import places_of
+
 POSE_COLUMNS = 57
 """Leading columns of `features` that are pose, 19 joints by 3; the two after them are travel."""
 
@@ -67,8 +69,7 @@ def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> N
     ids = clip_ids.combine_chunks() if isinstance(clip_ids, pa.ChunkedArray) else clip_ids
     a = pc.index_in(pairs["clip_a"], ids).to_numpy().astype(np.int64)
     b = pc.index_in(pairs["clip_b"], ids).to_numpy().astype(np.int64)
-    first, second = np.minimum(a, b), np.maximum(a, b)
-    return first * count - first * (first + 1) // 2 + second - first - 1
+    return places_of(np.minimum(a, b), np.maximum(a, b), count)
 
 
 def condensed(pairs: pa.Table, column: str, places: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.clustering import average_linkage, complete_linkage, fuzzy_linkage, ward_linkage
+from motionary.pipeline.clustering.condensed import places_of
 from motionary.pipeline.distances import THRESHOLDS, PairwiseDistances
 
 Condensed = NDArray[np.float64]
@@ -117,4 +118,4 @@ def pairs_among(chosen: NDArray[np.intp], clips: int) -> NDArray[np.intp]:
         In the condensed order of the chosen clips.
     """
     first, second = (chosen[side] for side in np.triu_indices(len(chosen), 1))
-    return first * clips - first * (first + 1) // 2 + second - first - 1
+    return places_of(first, second, clips)
