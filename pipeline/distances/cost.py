@@ -101,10 +101,10 @@ def checked_clips(clips: Sequence[ArrayLike], names: Sequence[str]) -> list[Floa
             )
         # A squared difference of two such values, summed over the dimensions, must stay finite.
         largest = np.sqrt(np.finfo(array.dtype).max / (5.0 * array.shape[1]))
-        with np.errstate(invalid="ignore"):
-            fits = np.abs(array) <= largest
-        if not fits.all():
-            frame, dimension = np.argwhere(~fits)[0]
+        # The extremes first: they need no array of their own, and are not a number where any value is not.
+        if not (-largest <= array.min() and array.max() <= largest):
+            with np.errstate(invalid="ignore"):
+                frame, dimension = np.argwhere(~(np.abs(array) <= largest))[0]
             value = array[frame, dimension]
             wrong = "not a finite number" if not np.isfinite(value) else f"larger than {largest:.3g}"
             raise ValueError(
@@ -148,13 +148,26 @@ def pack_clips(clips: Sequence[FloatArray]) -> PackedClips:
     dimensions = clips[0].shape[1]
     rows = np.empty((row_start[-1], dimensions), dtype=clips[0].dtype)
     lanes = np.empty((block_start[-1], dimensions, LANES), dtype=clips[0].dtype)
-    for index, clip in enumerate(clips):
-        row, end = row_start[index : index + 2]
-        block, last_block = block_start[index : index + 2]
-        filled = clip[np.minimum(np.arange((last_block - block) * LANES), len(clip) - 1)]
-        rows[row:end] = filled[: end - row]
-        lanes[block:last_block] = filled.reshape(-1, LANES, dimensions).swapaxes(1, 2)
+    _lay_out(np.concatenate(clips), frames, row_start, block_start, rows, lanes)
     return PackedClips(rows, lanes, frames, row_start, block_start)
+
+
+@kernel
+def _lay_out(stacked, frames, row_start, block_start, rows, lanes):  # type: ignore[no-untyped-def]
+    """Fill `rows` and `lanes` from clips stacked one after another, and what they leave by last frames."""
+    begin, dimensions = 0, stacked.shape[1]
+    for clip in range(len(frames)):
+        last = begin + frames[clip] - 1
+        for row in range(row_start[clip], row_start[clip + 1]):
+            frame = min(begin + row - row_start[clip], last)
+            for k in range(dimensions):
+                rows[row, k] = stacked[frame, k]
+        for block in range(block_start[clip], block_start[clip + 1]):
+            for lane in range(LANES):
+                frame = min(begin + (block - block_start[clip]) * LANES + lane, last)
+                for k in range(dimensions):
+                    lanes[block, k, lane] = stacked[frame, k]
+        begin = last + 1
 
 
 @kernel
