@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -21,6 +22,9 @@ from motionary.pipeline.stages.motions import read_motion_rows
 if TYPE_CHECKING:
     import duckdb
     import pandas as pd
+
+    from motionary.catalog.export import ExportedClip
+    from motionary.catalog.export_plan import ExportFormat
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class _Table:
             raise AttributeError(
                 f"{self.name} is a table of an opened catalog: Catalog.open(url).{self.name}"
             )
-        return CatalogTable(self.name, catalog.store, catalog.snapshot.tables[self.name])
+        return CatalogTable(self.name, catalog.store, catalog.files(self.name))
 
 
 class Catalog:
@@ -117,6 +121,22 @@ class Catalog:
     def __repr__(self) -> str:
         return f"<Catalog {self.store.url}: {len(self.clips)} clips, snapshot {self.snapshot.snapshot_id}>"
 
+    def files(self, table: str) -> Sequence[str]:
+        """List the Parquet files of a table, relative to the catalog.
+
+        Raises
+        ------
+        CatalogError
+            The catalog was published by a motionary that did not make this table yet.
+        """
+        try:
+            return self.snapshot.tables[table]
+        except KeyError:
+            raise CatalogError(
+                f"{self.store.url} has no table {table!r}; an older motionary published it; make it with: "
+                f"motionary run LIBRARY {self.store.url}"
+            ) from None
+
     def sql(self, query: str, parameters: Sequence[object] | Mapping[str, object] | None = None) -> pa.Table:
         """Ask a question in DuckDB's SQL; every table of the catalog is a view of its name.
 
@@ -168,6 +188,54 @@ class Catalog:
         row = alignments.filter(pc.equal(alignments["clip_id"], clip_id))
         return self._motion(clip, "aligned", row["frame_rate"][0].as_py())
 
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        format: ExportFormat = "bvh",
+        *,
+        clips: Sequence[str] | None = None,
+        cluster: int | str | None = None,
+        aligned: bool = False,
+        overwrite: bool = False,
+    ) -> list[ExportedClip]:
+        """Write motions as files that other programs read, lengths in the source's units.
+
+        Parameters
+        ----------
+        folder : path
+            Made where it is missing.
+        format : {"bvh", "npz", "parquet"}
+            A BVH a clip; an NPZ a clip, see `motionary.pipeline.writers.npz`; or `frames.parquet` or
+            `aligned.parquet` for all, beside `clips.parquet` with their skeletons. A clip's file is
+            called by its clip_id, with the suffix replaced.
+        clips : sequence of str, optional
+            Only these clips.
+        cluster : int or str, optional
+            Only the clips of the cluster of this number, or else of all clusters of this name.
+        aligned : bool
+            In the time of the cluster's reference instead of as captured.
+        overwrite : bool
+            Replace files that are there.
+
+        Returns
+        -------
+        list of ExportedClip
+            Each clip with its path, or with the `reason` why it could not be written.
+
+        Raises
+        ------
+        CatalogError
+            There is no such clip or cluster, nothing to export, a file that would be replaced, or the folder
+            is part of the library or cannot be written.
+        """
+        from motionary.catalog.export import write_export
+        from motionary.catalog.export_plan import plan_export
+
+        plan = plan_export(
+            self, folder, format, clips=clips, cluster=cluster, aligned=aligned, overwrite=overwrite
+        )
+        return list(write_export(plan))
+
     def _create_views(self, connection: duckdb.DuckDBPyConnection) -> None:
         filesystem = self.store.filesystem
         if not isinstance(filesystem, LocalFileSystem):
@@ -181,7 +249,7 @@ class Catalog:
         rows = table.filter(pc.equal(table["clip_id"], clip_id)).to_pylist()
         if not rows:
             raise CatalogError(
-                f"no clip {clip_id!r} in {self.store.url}{_nearest(clip_id, table['clip_id'].to_pylist())}"
+                f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, table['clip_id'].to_pylist())}"
             )
         return rows[0]
 
@@ -191,12 +259,13 @@ class Catalog:
             pq.read_table(
                 self.store.path(file), filesystem=filesystem, filters=[("clip_id", "=", clip["clip_id"])]
             )
-            for file in self.snapshot.tables[table]
+            for file in self.files(table)
         )
         return read_motion_rows(clip, rows, fps)
 
 
-def _nearest(name: str, known: Sequence[str]) -> str:
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Ask whether one of the names most like an unknown one was meant; empty where none is like it."""
     from difflib import get_close_matches
 
     close = get_close_matches(name, known, n=3, cutoff=0.5)

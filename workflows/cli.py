@@ -218,6 +218,75 @@ def reproduce(
         write_table(experiment.study.to_arrow(), format_)
 
 
+@app.command()
+def export(
+    catalog: CatalogUrl,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the files go; made if missing.")],
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", help="Only the cluster of this number, or all of this name."),
+    ] = None,
+    clip: Annotated[list[str] | None, typer.Option("--clip", help="Only this clip; repeat for more.")] = None,
+    aligned: Annotated[
+        bool,
+        typer.Option("--aligned", help="In the time of the cluster's reference instead of as captured."),
+    ] = False,
+    format_: Annotated[
+        Literal["bvh", "npz", "parquet"],
+        typer.Option("--format", help="A BVH or an NPZ a clip, or Parquet for all."),
+    ] = "bvh",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
+) -> None:
+    """Write motions of CATALOG to DIR: of a cluster, of some clips, or all.
+
+    A file is called by its clip's path in the library, with another suffix.
+    Lengths stay in the source's units; BVH does not say which they are.
+    """
+    if cluster is not None and clip:
+        raise typer.BadParameter("give --cluster or --clip, not both")
+    from functools import partial
+
+    from motionary.catalog.export_plan import plan_export
+    from motionary.workflows.export import export_summary, write_with_progress
+    from motionary.workflows.progress import progress
+
+    plan = plan_export(
+        _open(catalog),
+        folder,
+        format_,
+        clips=clip or None,
+        cluster=cluster,
+        aligned=aligned,
+        overwrite=overwrite,
+    )
+    failed = write_with_progress(plan, partial(progress, console=_stderr()))
+    for one in failed:
+        print(f"motionary: {one.clip_id} is not exported: {one.reason}", file=sys.stderr)
+    print(export_summary(plan, len(failed)))
+    if failed:
+        raise typer.Exit(QUARANTINED)
+
+
+@app.command()
+def transfer(
+    catalog: CatalogUrl,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="A file ending in .bvh.")],
+    style: Annotated[str, typer.Option("--style", metavar="CLIP", help="Whose style is taken.")],
+    onto: Annotated[str, typer.Option("--onto", metavar="CLIP", help="Who gets it; of the same cluster.")],
+) -> None:
+    """Give one clip of CATALOG the style of another, as BVH.
+
+    Both are taken in the time of their cluster's reference. Printed is how fast
+    feet slide while they stand, of both and of the result.
+    """
+    from motionary.workflows.tables import output_console
+    from motionary.workflows.transfer import sliding_table, transfer_to_bvh
+
+    made = transfer_to_bvh(_open(catalog), out, style, onto)
+    print(f"wrote {out}: {made.motion.frames} frames, in the time of {made.reference_id}")
+    output_console().print(sliding_table(made))
+
+
 def main() -> NoReturn:
     """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
     try:

@@ -2,12 +2,15 @@
 
 from motionary.pipeline.alignment.correlation import mean_correlation
 from motionary.pipeline.alignment.cotw import CotwWarp, cotw, default_parameters
+from motionary.pipeline.alignment.path_warp import PathWarp, dtw
 from motionary.pipeline.alignment.reference import (
     ReferenceScores,
     score_references,
     select_reference,
     similarity_index,
 )
+from motionary.pipeline.alignment.search import cotw_search
+from motionary.pipeline.alignment.trajectories import computed_trajectories, roughness
 from motionary.pipeline.alignment.uniform import uniform
 from motionary.pipeline.alignment.warp import Warp
 from motionary.pipeline.alignment.weights import PRESETS, joint_weights
@@ -15,12 +18,17 @@ from motionary.pipeline.alignment.weights import PRESETS, joint_weights
 __all__ = [
     "PRESETS",
     "CotwWarp",
+    "PathWarp",
     "ReferenceScores",
     "Warp",
+    "computed_trajectories",
     "cotw",
+    "cotw_search",
     "default_parameters",
+    "dtw",
     "joint_weights",
     "mean_correlation",
+    "roughness",
     "score_references",
     "select_reference",
     "similarity_index",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionary.pipeline.alignment.cotw import rounding_level
+from motionary.pipeline.alignment.rounding import rounding_level
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -27,7 +27,7 @@ def mean_correlation(values: FloatArray, reference: FloatArray, weights: FloatAr
     Raises
     ------
     ValueError
-        Shapes disagree.
+        Shapes disagree, or all weights are 0.
     """
     values, reference = np.asarray(values), np.asarray(reference)
     if values.shape != reference.shape or values.ndim != 2:
@@ -35,6 +35,8 @@ def mean_correlation(values: FloatArray, reference: FloatArray, weights: FloatAr
             f"values have shape {values.shape} and reference {reference.shape}; (frames, dofs) both"
         )
     weights = checked_weights(weights, values.shape[1])
+    if not weights.any():
+        raise ValueError("all weights are 0; the mean correlation needs one that is not")
     centred, norms = zip(*(_centred(sequence) for sequence in (values, reference)), strict=True)
     moves = (norms[0] > 0) & (norms[1] > 0)
     products = (centred[0] * centred[1]).sum(axis=0)

@@ -14,10 +14,13 @@ backward recurrence over the place s of each node in output time finds the exact
 
 Where we differ from the paper:
 
-- Table 1's loop bounds are wrong as printed. Node k, k segments from the first frame and c - k from the last,
-  reaches exactly k L - r .. k L + r with r = slack min(k, c - k).
+- Table 1's loop bounds are wrong as printed: see `nodes.node_ranges`.
 - A DOF that does not vary on a segment, in either sequence, counts 0; the paper leaves it undefined (6.5).
   Not varying means a standard deviation of at most what rounding leaves: see `rounding_level`.
+- Two of its limits are lifted where asked for. Nodes may lie unequally (`nodes.boundary_nodes`). With
+  `open_ends` the first node may come to lie up to `slack` frames before the output and the last as far after
+  it: then the reference's ends meet other frames of the input. Of a segment that hangs over, what lies within
+  is compared, at least 4 frames from end to end; sum eta is how far the last node was moved less the first.
 - Ties go to the least |eta|, the shorter segment first, in order of the segments. Sums that differ by less
   than 1e-12 of the weights' sum are ties, so that rounding alone never bends time.
 """
@@ -26,18 +29,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import index
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.alignment.uniform import uniform_times
-from motionary.pipeline.alignment.warp import Warp, checked_sequence, interpolate
-from motionary.pipeline.alignment.weights import checked_weights
+from motionary.pipeline.alignment.matched import MatchedPair, matched_pair
+from motionary.pipeline.alignment.nodes import (
+    LEAST_LENGTH,
+    Segments,
+    boundary_nodes,
+    equal_nodes,
+    stretchable,
+)
+from motionary.pipeline.alignment.warp import Warp
+from motionary.pipeline.alignment.whole_output import WholeOutput
 from motionary.pipeline.motion import FloatArray
 
-_LEAST_LENGTH = 4  # the least stretched segment: slack <= L - 4 [CoTW 4]
-_MOST_DEFAULT_SLACK = 60  # two seconds at 30 frames a second
+Spacing = Literal["equal", "boundaries"]
+SPACINGS: tuple[Spacing, ...] = ("equal", "boundaries")
 _TIE = 1e-12
+_MOST_DEFAULT_SLACK = 60  # two seconds at 30 frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,25 +61,42 @@ class CotwWarp(Warp):
     objective : float
         Sum over segments and DOFs of weighted correlations, on the length-matched sequence.
     eta : array (segments,) int64
-        By how many frames each segment was stretched; they sum to 0.
+        By how many frames each segment was stretched. They sum to 0 unless the ends are open.
+    nodes : array (segments + 1,) int64
+        The segments' ends in length-matched time, frames of the reference.
+    first_frame : int
+        Output frame of the first node: 0, or less where the ends are open.
     segment_length : int
         L, frames of the reference.
     slack : int
         The most that a segment may be stretched or shortened, frames.
+    correlation : float
+        rho: weighted mean over DOFs of the correlation of the whole output with the reference, on the
+        length-matched sequence; see `whole_output`.
+    distortion : float
+        |h|: the absolute value of the weighted mean over DOFs of eq. 7.
     """
 
     objective: float
     eta: NDArray[np.int64]
+    nodes: NDArray[np.int64]
+    first_frame: int
     segment_length: int
     slack: int
+    correlation: float
+    distortion: float
 
 
 def cotw(
     moving: FloatArray,
     reference: FloatArray,
-    segment_length: int,
-    slack: int,
+    segment_length: int | None = None,
+    slack: int | None = None,
     weights: FloatArray | None = None,
+    *,
+    segments: int | None = None,
+    spacing: Spacing = "equal",
+    open_ends: bool = False,
 ) -> CotwWarp:
     """Warp one sequence so that its segments correlate best with the reference's [CoTW 3].
 
@@ -77,13 +106,20 @@ def cotw(
         The sequence to be warped.
     reference : array (m, dofs)
         The sequence whose timing it takes.
-    segment_length : int
-        L, frames of the reference, 4 .. m. Above m / 2 there is one segment, and the warp is `uniform`.
-        A reference of fewer than 4 frames has L = m.
-    slack : int
-        0 .. L - 4 frames; 0 where L < 4.
+    segment_length : int, optional
+        L, frames of the reference, 4 .. m; the length of a stride, for example [CoTW 6.2]. Above m / 2 there
+        is one segment, and the warp is `uniform`. A reference of fewer than 4 frames has L = m.
+    slack : int, optional
+        0 .. L - 4 frames; 0 where L < 4. By default the most, which is always safe [CoTW 4].
     weights : array (dofs,), optional
-        Not negative; 1 each by default.
+        Not negative, not all 0; 1 each by default.
+    segments : int, optional
+        The number of segments instead of their length, such as the number of actions shown [CoTW 4]: then
+        L = floor(m / segments), and the last takes the residual.
+    spacing : {"equal", "boundaries"}
+        Nodes every L frames, or each where the reference pauses nearby: see `nodes.boundary_nodes`.
+    open_ends : bool
+        Whether the reference's first and last frame may meet other frames than the input's.
 
     Returns
     -------
@@ -93,27 +129,16 @@ def cotw(
     Raises
     ------
     ValueError
-        Shapes disagree, a value is not finite, or a parameter is out of its range.
+        Shapes disagree, a value is not finite, all weights are 0, or a parameter is out of its range.
     """
-    moving, reference = checked_sequence(moving, "moving"), checked_sequence(reference, "reference")
-    if moving.shape[1] != reference.shape[1]:
-        raise ValueError(
-            f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
-        )
-    weights = checked_weights(weights, reference.shape[1])
-    frames = len(reference)
-    segment_length, slack = _checked_parameters(segment_length, slack, frames)
-    nodes = segment_nodes(frames, segment_length)
-    tables = correlation_tables(moving, reference, nodes, slack, weights)
-    objective, eta = best_stretches(tables, slack, _TIE * float(weights.sum()))
-    return CotwWarp(
-        source_time=composed_times(nodes, eta, len(moving)),
-        moving_frames=len(moving),
-        objective=objective,
-        eta=eta,
-        segment_length=segment_length,
-        slack=slack,
-    )
+    pair = matched_pair(moving, reference, weights)
+    whole = WholeOutput(pair)
+    length, count = _length_and_count(segment_length, segments, pair.frames)
+    most = _checked_slack(slack, length)
+    nodes = placed_nodes(pair, length, count, spacing)
+    stretched = stretchable(nodes, most, open_ends)
+    moved = best_moves(correlation_tables(pair, stretched), stretched, pair.total_weight)
+    return warp_of(pair, whole, nodes, moved, length, most)
 
 
 def default_parameters(reference_frames: int, segment_length: int | None = None) -> tuple[int, int]:
@@ -136,135 +161,196 @@ def default_parameters(reference_frames: int, segment_length: int | None = None)
     half = reference_frames // 2
     if segment_length is not None:
         length = min(segment_length, reference_frames)
-    elif half > _LEAST_LENGTH:
+    elif half > LEAST_LENGTH:
         length = min(max(round(reference_frames / 4), 8), half)
     else:
         length = reference_frames
-    return length, min(max(length - _LEAST_LENGTH, 0), _MOST_DEFAULT_SLACK)
+    return length, min(max(length - LEAST_LENGTH, 0), _MOST_DEFAULT_SLACK)
 
 
-def segment_nodes(frames: int, segment_length: int) -> NDArray[np.int64]:
-    """Return the segments' ends in length-matched time (c + 1,): 0, L, ..., (c - 1) L, m - 1."""
-    segments = max(1, frames // segment_length)
-    return np.append(np.arange(segments) * segment_length, frames - 1)
+def placed_nodes(
+    pair: MatchedPair, segment_length: int, segments: int, spacing: Spacing
+) -> NDArray[np.int64]:
+    """Return the nodes (segments + 1,) of a pair.
+
+    Raises
+    ------
+    ValueError
+        There is no such spacing.
+    """
+    if spacing not in SPACINGS:
+        raise ValueError(f"spacing is {spacing!r}; it must be one of {', '.join(map(repr, SPACINGS))}")
+    nodes = equal_nodes(pair.frames, segment_length)[: segments + 1]
+    nodes[-1] = pair.frames - 1
+    if spacing == "boundaries":
+        return boundary_nodes(pair.target[: pair.frames], nodes, pair.weights)
+    return nodes
 
 
-def correlation_tables(
-    moving: FloatArray,
-    reference: FloatArray,
-    nodes: NDArray[np.int64],
-    slack: int,
-    weights: FloatArray,
-) -> list[FloatArray]:
-    """Compute J for every segment, stretch and output place that a warp within `slack` can reach.
+@dataclass(frozen=True, eq=False)
+class CorrelationTables:
+    """J of every segment, stretch and output place that a warp can reach.
 
     Parameters
     ----------
-    moving : array (n, dofs)
-    reference : array (m, dofs)
-    nodes : array (c + 1,)
-        From `segment_nodes`.
-    slack : int
-        The largest that `best_stretches` will be asked for.
-    weights : array (dofs,)
+    values : array (cells,)
+        The tables of c segments one after another, each [eta - least_eta, output frame - first].
+    start : array (c + 1,)
+        Where each begins.
+    least_eta, most_eta : array (c,)
+        Rows.
+    first, places : array (c,)
+        Columns: the output frame of the first, and their number.
+    """
+
+    values: FloatArray
+    start: NDArray[np.int64]
+    least_eta: NDArray[np.int64]
+    most_eta: NDArray[np.int64]
+    first: NDArray[np.int64]
+    places: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """Inverse norms of the reference's centred windows, spans from `least` on; one serves a whole search."""
+
+    inverse: FloatArray
+    least: int
+
+
+def reference_deviations(pair: MatchedPair, least: int, most: int) -> Deviations:
+    """Compute the inverse norms of all windows of `least` to `most` frames from end to end."""
+    from motionary.pipeline.alignment.cotw_kernels import inverse_deviations
+
+    most = max(least, min(most, pair.frames - 1))
+    return Deviations(inverse_deviations(pair.target, pair.frames, pair.target_floor, least, most), least)
+
+
+def correlation_tables(
+    pair: MatchedPair, segments: Segments, deviations: Deviations | None = None
+) -> CorrelationTables:
+    """Compute J wherever the segments can go.
+
+    Parameters
+    ----------
+    pair : MatchedPair
+    segments : Segments
+    deviations : Deviations, optional
+        Of at least the spans needed; made here where not given.
 
     Returns
     -------
-    list of c arrays (2 slack + 1, 2 r_k + 1)
-        Row: eta + slack. Column: the segment's first output frame, from nodes[k] - r_k on. Cells that no warp
-        reaches are 0 and never read. A cell's bits do not depend on `slack`.
+    CorrelationTables
+        They serve smaller slacks and narrower ranges too: no cell depends on them.
     """
-    from motionary.pipeline.alignment.cotw_kernels import segment_table
+    from motionary.pipeline.alignment.cotw_kernels import fill_tables
 
-    moving_floor, reference_floor = rounding_level(moving) ** 2, rounding_level(reference) ** 2
-    matched = interpolate(moving.astype(np.float64), uniform_times(len(moving), len(reference)))
-    source = np.ascontiguousarray((matched - matched.mean(axis=0)).T)
-    target = np.ascontiguousarray((reference - reference.mean(axis=0, dtype=np.float64)).T)
-    radii = _node_radii(len(nodes) - 1, slack)
-    return [
-        segment_table(
-            np.ascontiguousarray(source[:, nodes[k] : nodes[k + 1] + 1]), target, weights,
-            moving_floor, reference_floor, slack, nodes[k], radii[k], radii[k + 1],
-        )
-        for k in range(len(nodes) - 1)
-    ]  # fmt: skip
+    spans, low, high = np.diff(segments.nodes), segments.low, segments.high
+    least_eta = np.maximum(-segments.slacks, low[1:] - high[:-1] - spans)
+    most_eta = np.minimum(segments.slacks, high[1:] - low[:-1] - spans)
+    places = high[:-1] - low[:-1] + 1
+    start = np.append(0, np.cumsum((most_eta - least_eta + 1) * places))
+    if deviations is None:
+        deviations = reference_deviations(pair, int((spans + least_eta).min()), int((spans + most_eta).max()))
+    values = np.zeros(start[-1])
+    fill_tables(
+        pair.source, pair.target, segments.nodes, low, high, least_eta, most_eta, start, pair.weights,
+        pair.source_floor, pair.target_floor, deviations.inverse, deviations.least, values,
+    )  # fmt: skip
+    return CorrelationTables(values, start, least_eta, most_eta, low[:-1], places)
 
 
-def best_stretches(tables: list[FloatArray], slack: int, tie: float) -> tuple[float, NDArray[np.int64]]:
+def best_moves(tables: CorrelationTables, segments: Segments, total_weight: float) -> NDArray[np.int64]:
     """Run Table 1's dynamic programme over the correlations.
 
     Parameters
     ----------
-    tables : list of c arrays
-        From `correlation_tables`, for this slack or a larger one.
-    slack : int
-        Bound of |eta|.
-    tie : float
-        Objectives that differ by no more count as equal.
+    tables : CorrelationTables
+        Of these segments, or of the same with larger slacks and ranges.
+    segments : Segments
+    total_weight : float
+        The weights' sum, by which ties are judged.
 
     Returns
     -------
-    objective : float
-    eta : array (c,) int64
+    array (c + 1,) int64
+        The output frame of every node.
     """
-    from motionary.pipeline.alignment.cotw_kernels import best_step
+    from motionary.pipeline.alignment.cotw_kernels import best_path
 
-    segments = len(tables)
-    radii = _node_radii(segments, slack)
-    best: FloatArray = np.zeros(1)
-    choices = []
-    for k in reversed(range(segments)):
-        best, choice = best_step(tables[k], best, slack, radii[k], radii[k + 1], tie)
-        choices.append(choice)
-    eta = np.zeros(segments, dtype=np.int64)
-    moved = 0
-    for k, choice in enumerate(reversed(choices)):
-        eta[k] = choice[moved + radii[k]]
-        moved += eta[k]
-    return float(best[0]), eta
+    moved = np.empty(len(segments.nodes), dtype=np.int64)
+    best_path(
+        tables.values, tables.start, tables.least_eta, tables.most_eta, tables.first, tables.places,
+        np.diff(segments.nodes), segments.slacks, segments.low, segments.high, _TIE * total_weight, moved,
+    )  # fmt: skip
+    return moved
 
 
-def composed_times(nodes: NDArray[np.int64], eta: NDArray[np.int64], moving_frames: int) -> FloatArray:
-    """Return the original moving time at each reference frame (m,): segment-wise warp, then length match."""
-    frames = nodes[-1] + 1
-    moved = nodes + np.append(0, np.cumsum(eta))
-    matched_time = np.interp(np.arange(frames), moved, nodes)
-    return matched_time * (moving_frames - 1) / max(frames - 1, 1)
+def warp_of(
+    pair: MatchedPair,
+    whole: WholeOutput,
+    nodes: NDArray[np.int64],
+    moved: NDArray[np.int64],
+    segment_length: int,
+    slack: int,
+) -> CotwWarp:
+    """Return the warp that brings the nodes to output frames `moved`; its times are the original's."""
+    from motionary.pipeline.alignment.cotw_kernels import sum_of_correlations
+
+    correlation, distortion = whole(nodes, moved)
+    times = np.interp(np.arange(pair.frames), moved, nodes)
+    return CotwWarp(
+        source_time=times * (pair.moving_frames - 1) / max(pair.frames - 1, 1),
+        moving_frames=pair.moving_frames,
+        objective=sum_of_correlations(
+            pair.source, pair.target, nodes, moved, pair.weights, pair.source_floor, pair.target_floor
+        ),
+        eta=np.diff(moved) - np.diff(nodes),
+        nodes=nodes,
+        first_frame=int(moved[0]),
+        segment_length=segment_length,
+        slack=slack,
+        correlation=correlation,
+        distortion=distortion,
+    )
 
 
-def rounding_level(values: FloatArray) -> FloatArray:
-    """Return the standard deviation up to which a DOF counts as constant (dofs,).
+def _length_and_count(segment_length: int | None, segments: int | None, frames: int) -> tuple[int, int]:
+    """Return L and the number of segments.
 
-    That is four roundings of its largest value in the dtype given (float32 features are coarser than their
-    arithmetic), and at least 1e-12 of the largest value of all: a joint that lies on an axis keeps noise
-    from the arithmetic of the whole body, which is large beside its own size.
-
-    Parameters
-    ----------
-    values : array (..., dofs)
-        In the dtype in which they were made.
+    Raises
+    ------
+    ValueError
+        Both or neither are given, or one is out of its range.
     """
-    dtype = values.dtype if np.issubdtype(values.dtype, np.floating) else np.float64
-    largest = np.abs(values).reshape(-1, values.shape[-1]).max(axis=0).astype(np.float64)
-    return np.maximum(4 * float(np.finfo(dtype).eps) * largest, 1e-12 * largest.max())
-
-
-def _checked_parameters(segment_length: int, slack: int, frames: int) -> tuple[int, int]:
-    segment_length, slack = index(segment_length), index(slack)
-    least = min(_LEAST_LENGTH, frames)
-    if not least <= segment_length <= frames:
+    if (segment_length is None) == (segments is None):
+        raise ValueError("give segment_length or segments, one of them")
+    least = min(LEAST_LENGTH, frames)
+    if segments is not None:
+        count = index(segments)
+        if not 1 <= count <= max(1, frames // least):
+            raise ValueError(
+                f"segments is {count}; a reference of {frames} frames has 1 .. {max(1, frames // least)} "
+                f"segments of at least {least} frames"
+            )
+        return frames // count, count
+    length = index(segment_length)  # type: ignore[arg-type]
+    if not least <= length <= frames:
         raise ValueError(
-            f"segment_length is {segment_length}; for a reference of {frames} frames "
+            f"segment_length is {length}; for a reference of {frames} frames "
             f"it must lie in {least} .. {frames}"
         )
-    most = max(segment_length - _LEAST_LENGTH, 0)
-    if not 0 <= slack <= most:
+    return length, max(1, frames // length)
+
+
+def _checked_slack(slack: int | None, segment_length: int) -> int:
+    most = max(segment_length - LEAST_LENGTH, 0)
+    if slack is None:
+        return most
+    if not 0 <= index(slack) <= most:
         raise ValueError(
             f"slack is {slack} and segment_length {segment_length}; "
-            f"slack must lie in 0 .. segment_length - {_LEAST_LENGTH} = {most}"
+            f"slack must lie in 0 .. segment_length - {LEAST_LENGTH} = {most}"
         )
-    return segment_length, slack
-
-
-def _node_radii(segments: int, slack: int) -> list[int]:
-    return [slack * min(k, segments - k) for k in range(segments + 1)]
+    return index(slack)

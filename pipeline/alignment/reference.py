@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from motionary.pipeline.alignment.cotw import rounding_level
+from motionary.pipeline.alignment.rounding import rounding_level
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import checked_sequence, interpolate
 from motionary.pipeline.alignment.weights import checked_weights

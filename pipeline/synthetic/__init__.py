@@ -2,7 +2,8 @@
 
 In reading order: `bodies` (who), `actions` (what; from `gaits`, `single_actions` and their `curves`),
 `styles` (how), `posture` (channels to a posed body), `conventions` (a posed body to a skeleton), `library`
-(takes and warps), `files` (a folder of them). Nothing is read from disk.
+(takes and warps), `files` (a folder of them), `style_takes` (takes for telling styles apart). Nothing is read
+from disk.
 """
 
 from motionary.pipeline.synthetic.actions import ACTIONS
@@ -16,6 +17,7 @@ from motionary.pipeline.synthetic.library import (
     template,
     template_frames,
 )
+from motionary.pipeline.synthetic.style_takes import style_takes
 from motionary.pipeline.synthetic.styles import STYLES
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "STYLES",
     "TEMPLATE_FPS",
     "SyntheticTake",
+    "style_takes",
     "synthetic_library",
     "template",
     "template_frames",

@@ -50,9 +50,9 @@ def nodes_of(frames, segment_length):
 class Problem:
     """One alignment: the gain of a segment stretched by eta from an output frame on."""
 
-    def __init__(self, moving, reference, segment_length, weights=None):
+    def __init__(self, moving, reference, segment_length, weights=None, nodes=None):
         self.frames = len(reference)
-        self.nodes = nodes_of(self.frames, segment_length)
+        self.nodes = nodes_of(self.frames, segment_length) if nodes is None else list(nodes)
         self.segments = len(self.nodes) - 1
         self.source = [length_matched(column, self.frames) for column in columns(moving)]
         self.target = columns(reference)
@@ -61,19 +61,21 @@ class Problem:
         self.gain = cache(self.gain)
 
     def gain(self, k, start, eta):
+        """Weighted correlation of what the segment shows within the reference."""
         first, length = self.nodes[k], self.nodes[k + 1] - self.nodes[k]
         out = length + eta
-        times = [first + j * length / out for j in range(out + 1)]
+        shown = [j for j in range(out + 1) if 0 <= start + j < self.frames]
+        times = [first + j * length / max(out, 1) for j in shown]
         total = 0.0
         for weight, source, target, levels in zip(
             self.weights, self.source, self.target, self.levels, strict=True
         ):
             x = [at(source, min(time, self.nodes[k + 1])) for time in times]
-            total += weight * correlation(x, target[start : start + out + 1], *levels)
+            total += weight * correlation(x, [target[start + j] for j in shown], *levels)
         return total
 
-    def objective(self, etas):
-        place, total = 0, 0.0
+    def objective(self, etas, start=0):
+        place, total = start, 0.0
         for k, eta in enumerate(etas):
             total += self.gain(k, place, eta)
             place += self.nodes[k + 1] - self.nodes[k] + eta
@@ -84,24 +86,85 @@ class Problem:
         ranges = [range(-slack, slack + 1)] * self.segments
         return {etas: self.objective(etas) for etas in itertools.product(*ranges) if sum(etas) == 0}
 
-    def best(self, slack):
-        """Greatest objective and one eta that has it, by recursion over the remaining segments."""
+    def best(self, slack, open_ends=False):
+        """Greatest objective and one (first output frame, eta) that has it, by memoised recursion."""
+        trim = slack if open_ends else 0
+        last = self.frames - 1
 
         @cache
         def remaining(k, place):
             if k == self.segments:
-                return (0.0, ()) if place == self.frames - 1 else (-math.inf, ())
+                return (0.0, ()) if last <= place <= last + trim else (-math.inf, ())
+            length = self.nodes[k + 1] - self.nodes[k]
+            bound = min(slack, max(length - 3, 0))
             options = []
-            for eta in range(-slack, slack + 1):
-                end = place + self.nodes[k + 1] - self.nodes[k] + eta
-                if end > self.frames - 1:
+            for eta in range(-bound, bound + 1):
+                end = place + length + eta
+                if k + 1 < self.segments and trim and not 4 <= end <= last - 3:
+                    continue
+                if end > last + trim:
                     continue
                 rest, etas = remaining(k + 1, end)
                 if rest > -math.inf:
                     options.append((self.gain(k, place, eta) + rest, (eta, *etas)))
             return max(options, default=(-math.inf, ()))
 
-        return remaining(0, 0)
+        starts = {start: remaining(0, start) for start in range(-trim, 1)}
+        start = max(starts, key=lambda one: starts[one][0])
+        return starts[start][0], (start, starts[start][1])
+
+
+def output(problem, nodes, moved):
+    """The length-matched input with its nodes brought to output frames, linear between, (dofs, frames)."""
+    times = []
+    for frame in range(problem.frames):
+        k = max(k for k in range(len(nodes) - 1) if moved[k] <= frame)
+        share = (frame - moved[k]) / max(moved[k + 1] - moved[k], 1)
+        times.append(nodes[k] + share * (nodes[k + 1] - nodes[k]))
+    return [[at(column, min(time, problem.frames - 1)) for time in times] for column in problem.source]
+
+
+def whole_output(problem, nodes, moved):
+    """Equation 8's rho and |h|, by their definitions."""
+    total = math.fsum(problem.weights)
+    rho = h = 0.0
+    shown = output(problem, nodes, moved)
+    for weight, x, y, matched, levels in zip(
+        problem.weights, shown, problem.target, problem.source, problem.levels, strict=True
+    ):
+        rho += weight * correlation(x, y, *levels)
+        if correlation(matched, matched, levels[0], levels[0]) > 0:
+            before, after = slope_norm(matched), slope_norm(x)
+            h += weight * (after - before) / before
+    return rho / total, abs(h / total)
+
+
+def slope_norm(column):
+    return math.sqrt(math.fsum((b - a) ** 2 for a, b in itertools.pairwise(column)))
+
+
+def search(moving, reference, weights, alpha, shortest=8):
+    """Equation 8's greatest value over the whole grid, every combination by itself."""
+    frames = len(reference)
+    problem = Problem(moving, reference, frames, weights)
+    rho, h = whole_output(problem, problem.nodes, problem.nodes)
+    values = {(frames, 0): rho - alpha * h}
+    for length in range(shortest, frames // 2 + 1):
+        problem = Problem(moving, reference, length, weights)
+        for slack in range(1, length - 3):
+            _, (_, etas) = problem.best(slack)
+            moved = list(
+                itertools.accumulate(
+                    (
+                        b - a + eta
+                        for (a, b), eta in zip(itertools.pairwise(problem.nodes), etas, strict=True)
+                    ),
+                    initial=0,
+                )
+            )
+            rho, h = whole_output(problem, problem.nodes, moved)
+            values[length, slack] = rho - alpha * h
+    return values
 
 
 def similarity_products(clips, weights=None):

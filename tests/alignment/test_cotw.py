@@ -6,13 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionary.pipeline.alignment import CotwWarp, cotw, default_parameters, uniform
-from motionary.pipeline.alignment.cotw import (
-    best_stretches,
-    composed_times,
-    correlation_tables,
-    rounding_level,
-    segment_nodes,
-)
+from motionary.pipeline.alignment.cotw import best_moves, correlation_tables, warp_of
+from motionary.pipeline.alignment.matched import matched_pair
+from motionary.pipeline.alignment.nodes import equal_nodes, stretchable
+from motionary.pipeline.alignment.rounding import rounding_level
+from motionary.pipeline.alignment.whole_output import WholeOutput
 from tests.alignment import naive
 
 
@@ -51,6 +49,8 @@ def alignments(draw: st.DrawFn, most_frames: int = 26) -> tuple:
     weights = draw(
         st.one_of(st.none(), st.lists(st.sampled_from([0.0, 0.5, 1.0, 2.0]), min_size=dofs, max_size=dofs))
     )
+    if weights is not None and not any(weights):
+        weights[0] = 1.0
     return moving, reference, length, slack, weights
 
 
@@ -62,6 +62,7 @@ def test_reaches_the_optimum_of_the_recursion(case: tuple) -> None:
     problem = naive.Problem(moving, reference, length, weights)
     best, _ = problem.best(slack)
     assert warp.objective == pytest.approx(best, abs=1e-9)
+    assert (warp.first_frame, warp.nodes.tolist()) == (0, problem.nodes)
     assert problem.objective(tuple(warp.eta.tolist())) == pytest.approx(best, abs=1e-9)
 
 
@@ -102,9 +103,10 @@ def test_keeps_its_bounds(case: tuple) -> None:
 
 def test_source_time_follows_the_nodes() -> None:
     """By hand: segments 0-8, 8-16, 16-25 stretched by 2, -3, 1 end at 10, 15, 25; 51 frames, factor 2."""
-    nodes = segment_nodes(26, 8)
+    nodes = equal_nodes(26, 8)
     np.testing.assert_array_equal(nodes, [0, 8, 16, 25])
-    times = composed_times(nodes, np.array([2, -3, 1]), 51)
+    pair = matched_pair(np.zeros((51, 1)), np.zeros((26, 1)), None)
+    times = warp_of(pair, WholeOutput(pair), nodes, np.array([0, 10, 15, 25]), 8, 3).source_time
     np.testing.assert_allclose(times[[0, 5, 10, 15, 25]], [0, 8, 16, 32, 50])
     np.testing.assert_allclose(np.diff(times[:11]), 1.6)
     np.testing.assert_allclose(np.diff(times[10:16]), 3.2)
@@ -135,7 +137,7 @@ def test_a_known_warp_is_recovered(moving_frames: int, eta: tuple[int, ...]) -> 
 def test_nodes_drift_as_far_as_the_ends_allow(sign: int) -> None:
     """Eight segments: the middle node moves by four slacks."""
     eta = sign * np.array([3, 3, 3, 3, -3, -3, -3, -3])
-    nodes = segment_nodes(97, 12)
+    nodes = equal_nodes(97, 12)
     moved = nodes + np.append(0, np.cumsum(eta))
     dense = wave(9601, 6, seed=4, harmonics=12)
     reference = dense[np.rint(np.interp(np.arange(97), moved, nodes) * 100).astype(int)]
@@ -155,18 +157,17 @@ def test_weights_choose_what_is_aligned() -> None:
         reference[:, dof] = dense[np.rint(np.interp(np.arange(60), moved, nodes) * 100).astype(int), dof]
     np.testing.assert_array_equal(cotw(moving, reference, 20, 16, [1, 0]).eta, [8, -8, 0])
     np.testing.assert_array_equal(cotw(moving, reference, 20, 16, [0, 2]).eta, [-6, 10, -4])
-    assert cotw(moving, reference, 20, 16, [0, 0]).objective == 0
 
 
-def test_tables_of_a_larger_slack_serve_smaller_ones() -> None:
+@pytest.mark.parametrize("open_ends", [False, True])
+def test_tables_of_a_larger_slack_serve_smaller_ones(open_ends: bool) -> None:
     moving, reference = wave(70, 4, seed=1), wave(60, 4, seed=2)
-    nodes = segment_nodes(60, 14)
-    shared = correlation_tables(moving, reference, nodes, 10, np.ones(4))
+    pair, nodes = matched_pair(moving, reference, None), equal_nodes(60, 14)
+    shared = correlation_tables(pair, stretchable(nodes, 10, open_ends))
     for slack in range(11):
-        objective, eta = best_stretches(shared, slack, 4e-12)
-        alone = cotw(moving, reference, 14, slack)
-        assert objective == alone.objective  # to the last bit
-        np.testing.assert_array_equal(eta, alone.eta)
+        moved = best_moves(shared, stretchable(nodes, slack, open_ends), 4.0)
+        alone = cotw(moving, reference, 14, slack, open_ends=open_ends)
+        np.testing.assert_array_equal(np.diff(moved) - np.diff(nodes), alone.eta)
 
 
 def test_a_single_segment_is_uniform() -> None:
@@ -207,7 +208,7 @@ def test_a_constant_dof_counts_nothing(dtype: type, which: str) -> None:
         )
         flat[:, 2] = column
         warp = cotw(moving, reference, 9, 5)
-        assert warp.objective == expected.objective
+        assert warp.objective == pytest.approx(expected.objective, abs=1e-13)
         np.testing.assert_array_equal(warp.eta, expected.eta)
 
 
@@ -243,12 +244,10 @@ def test_ties_go_to_the_shorter_segment_first() -> None:
     """A pair that is symmetric in time is as well served by (-e, e) as by its mirror image (e, -e)."""
     time = np.linspace(-1, 1, 25)
     moving, reference = np.cos(4 * time)[:, None], np.cos(9 * time)[:, None]
-    tables = correlation_tables(moving, reference, np.array([0, 12, 24]), 8, np.ones(1))
-    by_eta = {eta: tables[0][eta + 8, 0] + tables[1][8 - eta, eta + 8] for eta in range(-8, 9)}
-    objective, eta = best_stretches(tables, 8, 1e-12)
-    assert eta[0] < 0
-    assert objective == pytest.approx(max(by_eta.values()), abs=1e-12)
-    assert by_eta[int(eta[0])] == pytest.approx(by_eta[-int(eta[0])], abs=1e-12)
+    warp = cotw(moving, reference, 12, 8)
+    mirrored = naive.Problem(moving, reference, 12).objective(tuple(-warp.eta))
+    assert mirrored == pytest.approx(warp.objective, abs=1e-12)
+    assert warp.eta[0] < 0
 
 
 def test_float32_and_float64_agree() -> None:
@@ -289,6 +288,7 @@ def test_inputs_are_left_alone_and_layout_does_not_matter() -> None:
         ({"weights": np.ones(3)}, r"weights have shape \(3,\).*2 DOFs"),
         ({"weights": [1, -1]}, "DOF 1 has weight -1"),
         ({"weights": [np.nan, 1]}, "DOF 0 has weight nan"),
+        ({"weights": [0, 0]}, "all weights are 0"),
     ],
 )
 def test_what_cannot_be_aligned_is_refused(change: dict, problem: str) -> None:
@@ -323,3 +323,67 @@ def test_rounding_level_reads_the_dtype() -> None:
     values = np.array([[1.0, 0.0], [-8.0, 1e-9]])
     np.testing.assert_allclose(rounding_level(values), [8e-12, 8e-12])
     np.testing.assert_allclose(rounding_level(values.astype(np.float32)), [32 * 2.0**-23, 8e-12])
+
+
+@given(alignments(most_frames=24))
+@settings(max_examples=60, deadline=None)
+def test_open_ends_reach_the_optimum_of_the_recursion(case: tuple) -> None:
+    moving, reference, length, slack, weights = case
+    warp = cotw(moving, reference, length, slack, weights, open_ends=True)
+    problem = naive.Problem(moving, reference, length, weights)
+    best, _ = problem.best(slack, open_ends=True)
+    assert warp.objective == pytest.approx(best, abs=1e-9)
+    assert problem.objective(tuple(warp.eta.tolist()), warp.first_frame) == pytest.approx(best, abs=1e-9)
+    assert -slack <= warp.first_frame <= 0
+    assert warp.first_frame + len(reference) - 1 + warp.eta.sum() in range(
+        len(reference) - 1, len(reference) + slack
+    )
+    assert warp.objective >= cotw(moving, reference, length, slack, weights).objective - 1e-9
+
+
+def test_open_ends_find_a_motion_inside_a_longer_one() -> None:
+    """The input has a lead-in and a lead-out that the reference has not: the paper must keep them."""
+    dense = wave(13001, 6, seed=7)
+    moving, reference = dense[::100], dense[1500:11501:100]
+    closed = cotw(moving, reference, 25, 21)
+    warp = cotw(moving, reference, 25, 21, open_ends=True)
+    truth = 15 + np.arange(101)
+    assert np.abs(warp.source_time - truth).mean() < 1.0
+    assert np.abs(closed.source_time - truth).mean() > 3.0
+    assert warp.source_time[0] > 10
+    assert warp.source_time[-1] < 120
+
+
+@pytest.mark.parametrize(("frames", "segments"), [(100, 3), (100, 15), (11, 2), (59, 7), (30, 1), (8, 2)])
+def test_the_number_of_segments_is_kept(frames: int, segments: int) -> None:
+    warp = cotw(wave(40, 2, seed=0), wave(frames, 2, seed=1), segments=segments)
+    length = frames // segments
+    assert len(warp.eta) == segments
+    np.testing.assert_array_equal(np.diff(warp.nodes)[:-1], length)
+    assert (warp.segment_length, warp.slack) == (length, max(length - 4, 0))
+
+
+def test_boundaries_are_where_the_reference_pauses() -> None:
+    """Three strokes with pauses at 20 to 23 and 35 to 38: equal nodes at 20 and 40 go there."""
+    pace = np.ones(61)
+    pace[[21, 22, 23, 36, 37, 38]] = 0.02
+    reference = np.sin(np.cumsum(pace) / 7)[:, None] * [1.0, -0.5]
+    warp = cotw(wave(50, 2, seed=1), reference, 20, 10, spacing="boundaries")
+    np.testing.assert_array_equal(warp.nodes, [0, 21, 36, 60])
+    problem = naive.Problem(wave(50, 2, seed=1), reference, 20, nodes=warp.nodes.tolist())
+    assert warp.objective == pytest.approx(problem.best(10)[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({}, "give segment_length or segments"),
+        ({"segment_length": 8, "segments": 2}, "give segment_length or segments"),
+        ({"segments": 0}, r"segments is 0; a reference of 30 frames has 1 \.\. 7"),
+        ({"segments": 8}, r"segments is 8.*1 \.\. 7 segments of at least 4 frames"),
+        ({"segment_length": 10, "spacing": "even"}, "spacing is 'even'; it must be one of 'equal'"),
+    ],
+)
+def test_unclear_segments_are_refused(options: dict, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        cotw(np.zeros((20, 2)), np.zeros((30, 2)), **options)

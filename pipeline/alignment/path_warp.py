@@ -1,0 +1,122 @@
+"""Warps that follow a path of frames: dynamic time warping (DTW), and what other methods of its kind share.
+
+A path joins frames of the moving sequence with frames of the reference, monotonously in both. The moving
+sequence is shown in the reference's time, so reference frame k shows the *mean* of the moving frames that the
+path joins with it:
+
+    source_time(k) = mean { i : (i, k) in path }
+
+Consecutive means never fall, since a path's steps never do. The paper instead stretches both sequences to the
+path's length, "a warped version of the reference", with a still frame wherever the path runs along an axis
+[CoTW 6.1, Figure 17]; here the reference keeps its time, and moving frames are run over where the path
+demands it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motionary.pipeline.alignment.warp import Warp, checked_sequence
+from motionary.pipeline.alignment.weights import checked_weights
+from motionary.pipeline.motion import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PathWarp(Warp):
+    """A warp and the path it was made of; see `path_warp`.
+
+    Parameters
+    ----------
+    path : array (L, 2) int64
+        Joined frames: of the moving sequence, of the reference.
+    """
+
+    path: NDArray[np.int64]
+
+
+def dtw(moving: FloatArray, reference: FloatArray, weights: FloatArray | None = None) -> PathWarp:
+    """Warp one sequence along the path on which its frames lie nearest to the reference's [CoTW 2].
+
+    Parameters
+    ----------
+    moving : array (n, dofs)
+        The sequence to be warped.
+    reference : array (m, dofs)
+        The sequence whose timing it takes.
+    weights : array (dofs,), optional
+        Of the squared differences, not negative; 1 each by default.
+
+    Returns
+    -------
+    PathWarp
+        Along `motionary.pipeline.distances.dtw_path`: the least total of Euclidean distances, steps (1, 1),
+        (1, 0) and (0, 1), both ends joined.
+
+    Raises
+    ------
+    ValueError
+        Shapes disagree, a value is not finite, or the sequences are too long (n + m above 2^19).
+    """
+    from motionary.pipeline.distances import cost_matrix, dtw_path
+
+    moving, reference = checked_sequence(moving, "moving"), checked_sequence(reference, "reference")
+    if moving.shape[1] != reference.shape[1]:
+        raise ValueError(
+            f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
+        )
+    if weights is not None:
+        scale = np.sqrt(checked_weights(weights, reference.shape[1]))
+        moving, reference = moving * scale, reference * scale
+    return path_warp(dtw_path(cost_matrix(moving, reference)), len(moving))
+
+
+def path_warp(path: ArrayLike, moving_frames: int) -> PathWarp:
+    """Turn a path of joined frames into a warp.
+
+    Parameters
+    ----------
+    path : array (L, 2) of int
+        Frames of the moving sequence and of the reference; neither falls, and every reference frame from 0 to
+        the last is joined with some moving frame.
+    moving_frames : int
+        Length of the moving sequence.
+
+    Returns
+    -------
+    PathWarp
+        At each reference frame the mean of the moving frames joined with it.
+
+    Raises
+    ------
+    ValueError
+        The path is no such path.
+    """
+    cells = np.array(path)
+    if cells.ndim != 2 or cells.shape[1] != 2 or not cells.size or not np.issubdtype(cells.dtype, np.integer):
+        raise ValueError(
+            f"path has shape {cells.shape} and type {cells.dtype}; it needs whole numbers, "
+            "(cells, 2), at least one cell"
+        )
+    falls = np.flatnonzero((np.diff(cells, axis=0) < 0).any(axis=1))
+    if falls.size:
+        cell = int(falls[0])
+        raise ValueError(
+            f"path goes from {tuple(cells[cell].tolist())} to {tuple(cells[cell + 1].tolist())} after cell "
+            f"{cell}; neither sequence's frames may fall"
+        )
+    if cells[0, 0] < 0 or cells[-1, 0] >= moving_frames:
+        raise ValueError(
+            f"path joins moving frames {cells[0, 0]} to {cells[-1, 0]}; "
+            f"a moving sequence of {moving_frames} frames has 0 to {moving_frames - 1}"
+        )
+    if cells[0, 1] < 0:
+        raise ValueError(f"path begins at reference frame {cells[0, 1]}; frames count from 0")
+    joined = np.bincount(cells[:, 1])
+    if not joined.all():
+        missing = int(np.argmin(joined))
+        raise ValueError(f"path meets no reference frame {missing}; it must meet all from 0 on")
+    source_time = np.bincount(cells[:, 1], weights=cells[:, 0]) / joined
+    return PathWarp(source_time, moving_frames, cells.astype(np.int64))

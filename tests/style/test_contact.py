@@ -1,0 +1,71 @@
+"""Foot sliding: known speeds, made-up takes that do not slide, and real clips."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionary.pipeline.readers import read_motion
+from motionary.pipeline.style import foot_sliding
+from motionary.pipeline.synthetic import BODIES, synthetic_library
+from tests.style.figures import moved, performed
+
+
+def test_a_standing_figure_that_is_pulled_along_slides_at_that_speed():
+    still = performed("wave", body="bea", frames=61)
+    assert foot_sliding(still) < 1e-3
+    along = np.linspace(0, 40, 61)  # centimetres, in two seconds
+    pulled = replace(still, root_position=still.root_position + np.multiply.outer(along, [0.6, 0.0, 0.8]))
+    assert foot_sliding(pulled) == pytest.approx(20.0, rel=1e-5)
+    assert foot_sliding(moved(pulled, 1.2, (100, 30, -5))) == pytest.approx(20.0, rel=1e-5)
+    # Half as many frames, each twice as far: the same speed.
+    fewer = replace(
+        pulled, fps=15.0, root_position=pulled.root_position[::2], rotations=pulled.rotations[::2]
+    )
+    assert foot_sliding(fewer) == pytest.approx(20.0, rel=1e-5)
+    # Without a unit the leg counts as .90 m long.
+    unknown = replace(pulled, unit=None)
+    assert foot_sliding(unknown) == pytest.approx(20.0 * 0.90 / BODIES["bea"].leg, rel=1e-5)
+
+
+def test_against_a_frame_at_a_time():
+    motion = performed("run", "tired", "chidi", frames=70)
+    toes = [motion.positions()[:, motion.skeleton.index(f"{side}ToeBase")] for side in ("Left", "Right")]
+    lower = [min(range(2), key=lambda side, k=k: toes[side][k, 1]) for k in range(70)]
+    heights = sorted(toes[lower[k]][k, 1] for k in range(70))
+    place = 0.02 * 69
+    floor = heights[int(place)] + (place % 1) * (heights[int(place) + 1] - heights[int(place)])
+    limit = floor + 2.5 / 0.90 * BODIES["chidi"].leg
+    speeds = []
+    for k in range(69):
+        one = lower[k]
+        if one == lower[k + 1] and max(toes[one][k, 1], toes[one][k + 1, 1]) <= limit:
+            step = toes[one][k + 1] - toes[one][k]
+            speeds.append(math.hypot(step[0], step[2]) * 30)
+    assert 5 < len(speeds) < 60
+    assert foot_sliding(motion) == pytest.approx(np.mean(speeds), rel=1e-9)
+
+
+def test_takes_whose_feet_stand_still_do_not_slide():
+    for take in synthetic_library():
+        limit = 4.0 if take.action in ("run", "jump") else 0.1
+        assert foot_sliding(take.motion) < limit, take.path
+
+
+def test_nothing_slides_where_nothing_stands():
+    motion = performed("wave", frames=2)
+    assert (
+        foot_sliding(replace(motion, root_position=motion.root_position[:1], rotations=motion.rotations[:1]))
+        == 0
+    )
+    flying = motion.root_position + [[0, 0, 0], [50, 100, 0]]
+    assert foot_sliding(replace(motion, root_position=flying)) == 0
+
+
+def test_real_walkers_slide_a_little(shared_data: Path):
+    clips = sorted((shared_data / "bandai").glob("dataset-1_walk_*.bvh"))[:6]
+    found = [foot_sliding(read_motion(path)) for path in clips]
+    assert 0 < min(found)
+    assert max(found) < 20
