@@ -1,6 +1,6 @@
 """A search for long sequences: the whole grid of a coarser version, its best warps refined [CoTW 4].
 
-The grid's time grows with the fourth power of the number of frames. So both sequences are brought to 80
+The grid's time grows with the fourth power of the number of frames. So both sequences are brought to 72
 frames, every segment length and slack is tried there, and the warps of greatest eq. 8 value, a few for each
 number of segments, are carried up level by level, each about twice as long as the last. On every level
 inner nodes are moved one at a time while that raises the value, within the slack.
@@ -18,17 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.cotw import Spacing, placed_nodes
-from motionary.pipeline.alignment.grid import GridWarp, all_warps, used_slack
+from motionary.pipeline.alignment.grid import GridWarp, all_warps
 from motionary.pipeline.alignment.matched import MatchedPair
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH, Segments, stretchable
 from motionary.pipeline.alignment.whole_output import WholeOutput
 
-COARSE_FRAMES = 80
+COARSE_FRAMES = 72
+# From this length on the coarse grid tries every second; lengths nearby are tried at the end.
+_DENSE = 16
 # How many warps are refined: of the coarse grid; of those as many as have one number of segments; and from
 # level to level as many as have these frames together, so that long sequences take no longer than others.
 _CARRIED, _OF_EACH_COUNT, _FRAMES_CARRIED = 30, 5, 2400
-# The better half are tried with segments a little shorter and longer too.
-_NEARBY = (-3, -2, -1, 1, 2, 3)
+# The best third are tried with segments a little shorter and longer too.
+_NEARBY = (-2, -1, 1, 2)
 # Frames by which nodes are first moved, on each level.
 _FIRST_STEP = 4
 
@@ -51,14 +53,15 @@ def refined_warps(
     coarse, *levels = _levels(pair.frames)
     level = pair.at_length(coarse)
     least, shortest_here = (ceil(length * coarse / pair.frames) for length in (LEAST_LENGTH, shortest))
-    warps = list(all_warps(level, shortest_here, least, spacing, open_ends))
+    lengths = [*range(shortest_here, _DENSE), *range(max(shortest_here, _DENSE), coarse // 2 + 1, 2)]
+    warps = list(all_warps(level, lengths, least, spacing, open_ends))
     carried = _worth_refining(warps, WholeOutput(level), alpha)
     for frames in levels:
         level = pair.at_length(frames)
         refine = _Refinement(level, pair.frames, shortest, alpha, spacing, open_ends)
         carried = refine([(warp, _length_at(warp, frames)) for warp in carried])
         carried = carried[: max(1, _FRAMES_CARRIED // frames)]
-    best = carried[: max(1, len(carried) // 2)]
+    best = carried[: max(1, len(carried) // 3)]
     return carried + refine([(warp, warp.segment_length + turn) for warp in best for turn in _NEARBY])
 
 
@@ -100,6 +103,8 @@ class _Refinement:
         return [warp for _, warp in finer]
 
     def _refined(self, warp: GridWarp, length: int) -> tuple[float, GridWarp]:
+        from motionary.pipeline.alignment.cotw_kernels import used_slack
+
         nodes = placed_nodes(self._level, length, len(warp.nodes) - 1, self._spacing)
         segments = stretchable(nodes, length - self._least, self._open_ends, self._least)
         moved = _within(segments, _carried_up(warp, nodes))

@@ -14,7 +14,7 @@ backward recurrence over the place s of each node in output time finds the exact
 
 Where we differ from the paper:
 
-- Table 1's loop bounds are wrong as printed: see `nodes.node_ranges`.
+- Table 1's loop bounds are wrong as printed: see `nodes.stretchable`.
 - A DOF that does not vary on a segment, in either sequence, counts 0; the paper leaves it undefined (6.5).
   Not varying means a standard deviation of at most what rounding leaves: see `rounding_level`.
 - Two of its limits are lifted where asked for. Nodes may lie unequally (`nodes.boundary_nodes`). With
@@ -282,7 +282,7 @@ def best_moves(tables: CorrelationTables, segments: Segments, total_weight: floa
     moved = np.empty(len(segments.nodes), dtype=np.int64)
     best_path(
         tables.values, tables.start, tables.least_eta, tables.most_eta, tables.first, tables.places,
-        np.diff(segments.nodes), segments.slacks, segments.low, segments.high, _TIE * total_weight, moved,
+        segments.nodes, segments.slacks, segments.low, segments.high, _TIE * total_weight, moved,
     )  # fmt: skip
     return moved
 

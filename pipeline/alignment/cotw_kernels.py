@@ -17,6 +17,36 @@ _kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"
 
 
 @_kernel
+def fill_bounds(
+    nodes: Integers, slack: int, trim: int, least: int, slacks: Integers, low: Integers, high: Integers
+) -> None:
+    """Fill each segment's slack and each node's range of output frames: see `nodes.stretchable`."""
+    segments, last, shorter = len(slacks), nodes[-1], max(least - 1, 1)
+    after = 0
+    for k in range(segments):
+        slacks[k] = min(slack, max(nodes[k + 1] - nodes[k] - shorter, 0))
+        after += slacks[k]
+    before = 0
+    for k in range(segments + 1):
+        low[k] = nodes[k] - min(trim + before, after)
+        high[k] = nodes[k] + min(before, trim + after)
+        if trim and 0 < k < segments:
+            low[k], high[k] = max(low[k], least), min(high[k], last - shorter)
+        if k < segments:
+            before += slacks[k]
+            after -= slacks[k]
+
+
+@_kernel
+def used_slack(nodes: Integers, moved: Integers) -> int:
+    """Return the least slack, from 1, that allows these moves, of inner nodes and of open ends."""
+    most = max(1, -moved[0], moved[-1] - nodes[-1])
+    for k in range(len(nodes) - 1):
+        most = max(most, abs(moved[k + 1] - moved[k] - nodes[k + 1] + nodes[k]))
+    return most
+
+
+@_kernel
 def inverse_deviations(
     reference: FloatArray, frames: int, floor: FloatArray, least: int, most: int
 ) -> FloatArray:
@@ -255,7 +285,7 @@ def best_path(
     most_eta: Integers,
     first: Integers,
     places: Integers,
-    spans: Integers,
+    nodes: Integers,
     slacks: Integers,
     low: Integers,
     high: Integers,
@@ -268,8 +298,10 @@ def best_path(
     ----------
     values, start, least_eta, most_eta, first, places : arrays
         The tables: see `cotw.CorrelationTables`.
-    spans, slacks : array (c,)
-        Each segment's frames from node to node in the input, and the most it may be stretched.
+    nodes : array (c + 1,)
+        In the input.
+    slacks : array (c,)
+        The most that each segment may be stretched.
     low, high : array (c + 1,)
         Output frames that each node may take here.
     tie : float
@@ -277,6 +309,7 @@ def best_path(
     moved : array (c + 1,)
         Filled with each node's output frame.
     """
+    spans = nodes[1:] - nodes[:-1]
     segments, widest = len(spans), (high - low).max() + 1
     choices = np.zeros((segments, widest), dtype=np.int64)
     best, following = np.zeros(widest), np.zeros(widest)

@@ -9,7 +9,7 @@ more than e < delta frames, it is the best within e .. delta as well, and the ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,26 +44,27 @@ class GridWarp:
 
 
 def all_warps(
-    pair: MatchedPair, shortest: int, least: int, spacing: Spacing, open_ends: bool
+    pair: MatchedPair, lengths: Sequence[int], least: int, spacing: Spacing, open_ends: bool
 ) -> Iterator[GridWarp]:
-    """Find the best warp of every segment length and slack, those that are the same once.
+    """Find the best warp of every slack of some segment lengths, those that are the same once.
 
     Parameters
     ----------
     pair : MatchedPair
-    shortest : int
-        The least L; the greatest is m / 2.
+    lengths : sequence of int
+        L, each at most m / 2.
     least : int
         The least stretched segment, frames; slacks are 1 .. L - least.
     spacing : {"equal", "boundaries"}
     open_ends : bool
     """
-    longest = pair.frames // 2
-    if shortest > longest:
+    from motionary.pipeline.alignment.cotw_kernels import used_slack
+
+    if not lengths:
         return
-    # The last segment may become a frame shorter: see `segment_slacks`.
+    # The last segment may become a frame shorter: see `nodes.stretchable`.
     deviations = reference_deviations(pair, max(least - 1, 1), pair.frames - 1)
-    for length in range(shortest, longest + 1):
+    for length in lengths:
         nodes = placed_nodes(pair, length, pair.frames // length, spacing)
         slack = length - least
         tables = correlation_tables(pair, stretchable(nodes, slack, open_ends, least), deviations)
@@ -72,9 +73,3 @@ def all_warps(
             slack = used_slack(nodes, moved)
             yield GridWarp(length, slack, nodes, moved)
             slack -= 1
-
-
-def used_slack(nodes: NDArray[np.int64], moved: NDArray[np.int64]) -> int:
-    """Return the least slack, from 1, that allows these moves, of inner nodes and of open ends."""
-    stretched = np.abs(np.diff(moved) - np.diff(nodes)).max()
-    return max(1, int(stretched), int(-moved[0]), int(moved[-1] - nodes[-1]))

@@ -67,24 +67,7 @@ class Segments:
 
 
 def stretchable(nodes: NDArray[np.int64], slack: int, open_ends: bool, least: int = LEAST_LENGTH) -> Segments:
-    """Return segments that may be stretched by the slack, and shortened to the least length."""
-    slacks = segment_slacks(nodes, slack, least)
-    return Segments(nodes, slacks, *node_ranges(nodes, slacks, slack if open_ends else 0, least))
-
-
-def segment_slacks(nodes: NDArray[np.int64], slack: int, least: int = LEAST_LENGTH) -> NDArray[np.int64]:
-    """Return the most that each segment may be stretched or shortened (c,).
-
-    The slack, but no segment becomes shorter than `least` frames, less one for the last: that is a frame
-    shorter where L divides m.
-    """
-    return np.clip(np.diff(nodes) - max(least - 1, 1), 0, slack)
-
-
-def node_ranges(
-    nodes: NDArray[np.int64], slacks: NDArray[np.int64], trim: int = 0, least: int = LEAST_LENGTH
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the least and the greatest output frame that each node can take, (c + 1,) each.
+    """Bound what a slack allows.
 
     Table 1's loop bounds are wrong as printed. A node lies no further from its own frame than the segments
     before it can push it, and no further than those after it can pull it back.
@@ -92,16 +75,16 @@ def node_ranges(
     Parameters
     ----------
     nodes : array (c + 1,)
-    slacks : array (c,)
-    trim : int
-        Frames by which the first node may come to lie before the output, and the last after it.
+    slack : int
+        The most that a segment may be stretched or shortened; and with `open_ends`, how far the first node
+        may come to lie before the output, and the last after it.
+    open_ends : bool
     least : int
-        Frames of the first and (less one) of the last segment that stay within the output even so.
+        No segment becomes shorter, nor what is seen of one that hangs over; the last by one frame, since it
+        is a frame shorter where L divides m.
     """
-    before = np.append(0, np.cumsum(slacks))
-    after = before[-1] - before
-    low, high = nodes - np.minimum(trim + before, after), nodes + np.minimum(before, trim + after)
-    if trim:
-        low[1:-1] = np.maximum(low[1:-1], least)
-        high[1:-1] = np.minimum(high[1:-1], nodes[-1] - max(least - 1, 1))
-    return low, high
+    from motionary.pipeline.alignment.cotw_kernels import fill_bounds
+
+    slacks, low, high = (np.empty(len(nodes) - turn, dtype=np.int64) for turn in (1, 0, 0))
+    fill_bounds(nodes, slack, slack if open_ends else 0, least, slacks, low, high)
+    return Segments(nodes, slacks, low, high)

@@ -79,7 +79,9 @@ def cotw_search(
     pair = matched_pair(moving, reference, weights)
     whole = WholeOutput(pair)
     if effort == "full" or pair.frames <= _FRAMES_OF_A_FULL_GRID:
-        warps: Iterable[GridWarp] = all_warps(pair, SHORTEST_SEGMENT, LEAST_LENGTH, spacing, open_ends)
+        warps: Iterable[GridWarp] = all_warps(
+            pair, range(SHORTEST_SEGMENT, pair.frames // 2 + 1), LEAST_LENGTH, spacing, open_ends
+        )
     else:
         warps = refined_warps(pair, SHORTEST_SEGMENT, alpha, spacing, open_ends)
     nodes = np.array([0, pair.frames - 1])
