@@ -9,13 +9,13 @@ BIN := $(VENV)/bin
 PEERS := .venv-peers
 SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed')
 
-.PHONY: help demo test test-all bench lint clean
+.PHONY: help demo test test-all bench bench-alignment lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
 	@echo "make test      run the tests, without those marked slow"
 	@echo "make test-all  run all tests"
-	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn"
+	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment"
 	@echo "make lint      check style, types and the direction of imports"
 	@echo "make clean     remove the environments and what the targets made"
 
@@ -34,6 +34,11 @@ test-all: $(VENV)/installed
 bench: $(VENV)/installed $(PEERS)/environment
 	@echo "== The distances beside dtaidistance, aeon and tslearn: some minutes, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks --peers $(PEERS)/bin/python --json motionary-bench/bench.json
+	@$(MAKE) --no-print-directory bench-alignment
+
+bench-alignment: $(VENV)/installed
+	@echo "== The alignment beside a naive recursion, and on real clips: a minute or two, best on a quiet machine"
+	$(BIN)/python -m tests.benchmarks.alignment --json motionary-bench/alignment.json
 
 lint: $(VENV)/installed
 	@echo "== Style, types, direction of imports"

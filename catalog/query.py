@@ -91,6 +91,7 @@ class Catalog:
     references = _Table()
     alignments = _Table()
     aligned_frames = _Table("aligned")
+    styles = _Table()
     quarantine = _Table()
     runs = _Table()
 

@@ -33,10 +33,11 @@ import numpy as np
 
 _MODULES = (
     "motionary.pipeline.alignment.cotw_kernels",
+    "motionary.pipeline.alignment.whole_output_kernels",
     "motionary.pipeline.clustering.linkage_kernels",
     "motionary.pipeline.distances.pairwise",
 )
-"""One module of each folder that holds kernels of the main job, naming some of them."""
+"""Modules that name kernels of the main job, at least one of each folder that holds some."""
 
 _LOCK = "motionary-kernels.lock"
 _PATIENCE = 600.0  # seconds to wait for another process, which needs some twenty
@@ -90,7 +91,7 @@ def _compile_in_this_process() -> None:
 
 def _call_every_kernel() -> None:
     """Call what the main job calls, with its types: features are float32, condensed distances float64."""
-    from motionary.pipeline.alignment import cotw
+    from motionary.pipeline.alignment import cotw, cotw_search
     from motionary.pipeline.clustering import complete_linkage, fuzzy_linkage
     from motionary.pipeline.distances import compare_clips, pairwise_distances
 
@@ -101,6 +102,9 @@ def _call_every_kernel() -> None:
     complete_linkage(pairs.weighted)
     fuzzy_linkage(pairs.fuzzy_low, pairs.fuzzy_high)
     cotw(clips[0], clips[1], segment_length=5, slack=1)
+    # Long enough for a coarse version and its refinement.
+    moving, reference = (random.random((frames, 59), dtype=np.float32) for frames in (30, 100))
+    cotw_search(moving, reference, effort="fast")
 
 
 @cache

@@ -10,9 +10,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from motionary.pipeline.canonical import Convention
+from motionary.pipeline.joint_weights import joint_weights
 
 FeatureKind = Literal["pose+travel", "paper"]
 Metric = Literal["dtw", "b_dtw", "weighted", "fuzzy"]
+Effort = Literal["fast", "full"]
+Spacing = Literal["equal", "boundaries"]
 LinkageMethod = Literal["complete", "ward", "average", "fuzzy"]
 
 
@@ -157,33 +160,64 @@ class ClusterConfig:
 
 @dataclass(frozen=True)
 class AlignmentConfig:
-    """CoTW inside each cluster [CoTW 3].
+    """CoTW inside each cluster, and the similarity index that chooses its reference [CoTW 3-5].
 
     Parameters
     ----------
+    search : {"fast", "full"}
+        How segment length and slack are found where neither a length nor a number of segments is given: the
+        whole grid for references of up to 96 frames and coarse to fine above (default), or the whole grid.
+    alpha : float
+        Weight of distortion against correlation in the search; .5 as in the paper.
     segment_length : int, optional
-        L, frames at 30 a second; by default a quarter of the reference, between 8 and half of it.
+        L, frames at the common rate; the length of a stride, for example. Of more than a reference has, all.
+    segments : int, optional
+        The number of segments instead, such as the number of actions shown.
     slack : int, optional
-        delta, frames; by default the largest the method allows, L - 4 [CoTW 4], but at most 60.
+        delta, frames, where `segment_length` or `segments` is given; by default the largest the method
+        allows, L - 4 [CoTW 4], and never more.
+    weights : {"full", "legs", "arms"} or mapping
+        What the alignment attends to: a preset of Table 2, or canonical joints and their weights; see
+        `motionary.pipeline.alignment.joint_weights`.
+    spacing : {"equal", "boundaries"}
+        Nodes every L frames, or each where the reference pauses nearby.
+    open_ends : bool
+        Whether a reference's first and last frame may meet other frames than the clip's.
     """
 
+    search: Effort = "fast"
+    alpha: float = 0.5
     segment_length: int | None = None
+    segments: int | None = None
     slack: int | None = None
+    weights: str | dict[str, float] = "full"
+    spacing: Spacing = "equal"
+    open_ends: bool = False
 
     def __post_init__(self) -> None:
-        if self.segment_length is not None:
-            _at_least("segment_length", self.segment_length, 5)
-        if self.slack is not None:
-            _at_least("slack", self.slack, 1)
-        if (
-            self.segment_length is not None
-            and self.slack is not None
-            and self.slack > self.segment_length - 4
-        ):
+        _one_of("search", self.search, ("fast", "full"))
+        _one_of("spacing", self.spacing, ("equal", "boundaries"))
+        _at_least("alpha", self.alpha, 0.0)
+        if self.segment_length is not None and self.segments is not None:
             raise ValueError(
-                f"slack is {self.slack} and segment_length {self.segment_length}; "
-                f"slack may be at most segment_length - 4 = {self.segment_length - 4}"
+                f"segment_length ({self.segment_length}) and segments ({self.segments}) are both given; "
+                "give one"
             )
+        if self.segment_length is not None:
+            _at_least("segment_length", self.segment_length, 4)
+        if self.segments is not None:
+            _at_least("segments", self.segments, 1)
+        if self.slack is not None:
+            _at_least("slack", self.slack, 0)
+            if self.segment_length is None and self.segments is None:
+                raise ValueError(f"slack ({self.slack}) is given alone; give segment_length or segments too")
+            if self.segment_length is not None and self.slack > self.segment_length - 4:
+                raise ValueError(
+                    f"slack is {self.slack} and segment_length {self.segment_length}; "
+                    f"slack may be at most segment_length - 4 = {self.segment_length - 4}"
+                )
+        if not joint_weights(self.weights).any():
+            raise ValueError(f"weights {self.weights!r} are all 0; weigh at least one joint")
 
 
 @dataclass(frozen=True)

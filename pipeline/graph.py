@@ -1,6 +1,6 @@
 """The Dask graph: which stage feeds which. Wiring, no mathematics.
 
-    files -> ingest (a batch) -> compare (two batches) -> cluster -> represent -> align (a batch)
+    files -> ingest (a batch) -> compare (two batches) -> cluster -> represent -> align (a batch) -> style
 
 A result is named by its key: a digest of its stage's version and settings and of the keys of what it reads,
 down to the digests of the files. Equal keys mean equal results, so a task whose result is stored already has
@@ -23,7 +23,7 @@ from dask.task_spec import Task as DaskTask
 
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.readers.library import Source
-from motionary.pipeline.stages import align, cluster, compare, ingest, represent
+from motionary.pipeline.stages import align, cluster, compare, ingest, represent, style
 
 
 class TableStore(Protocol):
@@ -103,7 +103,8 @@ def build_graph(
     represented = _task(
         store, "represent", represent.represent, represent.VERSION, represent.MAKES,
         reads=[("clips", [clustered]), ("members", [clustered]), ("pairs", tiles), ("features", ingested)],
-        settings=asdict(config.clusters), arguments=(config.clusters,),
+        settings=(asdict(config.clusters), config.alignment.weights),
+        arguments=(config.clusters, config.alignment),
     )  # fmt: skip
     aligned = [
         _task(
@@ -115,7 +116,13 @@ def build_graph(
         )
         for batch in ingested
     ]  # fmt: skip
-    return [*ingested, *tiles, clustered, represented, *aligned]
+    styled = _task(
+        store, "style", style.style, style.VERSION, style.MAKES,
+        reads=[("clips", [clustered]), ("clusters", [represented]), ("aligned", aligned)],
+        settings=[asdict(one) for one in config.features.conventions],
+        arguments=(config.features.conventions, config.features.frame_rate),
+    )  # fmt: skip
+    return [*ingested, *tiles, clustered, represented, *aligned, styled]
 
 
 def batched_by_name(sources: Sequence[Source], size: int) -> list[list[Source]]:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from motionary.pipeline.style.rig import REGIONS
+
 LABEL_COLUMNS = ("action", "style", "subject", "take", "description", "licence")
 """Label columns that `clips` always has; a labels file may bring more."""
 
@@ -189,9 +191,24 @@ TABLES: dict[str, pa.Schema] = {
             table_field("slack", pa.int32(), "delta of CoTW", "frames at the common rate"),
             table_field("objective", pa.float64(), "sum over segments and columns [CoTW eq. 5]"),
             table_field(
-                "correlation_before", pa.float64(), "mean over 57 columns, still ones 0; length-matched"
+                "correlation_before",
+                pa.float64(),
+                "correlation with the reference, weighted mean over 57 columns, still ones 0; length-matched",
             ),
-            table_field("correlation", pa.float64(), "mean over 57 columns, still ones 0; aligned"),
+            table_field("correlation", pa.float64(), "the same, aligned: rho of [CoTW eq. 8]"),
+            table_field("distortion", pa.float64(), "|h| of [CoTW eq. 7-8]"),
+            table_field(
+                "nodes",
+                pa.list_(pa.int32()),
+                "ends of the segments, length-matched",
+                "frames of the reference",
+            ),
+            table_field(
+                "first_frame",
+                pa.int32(),
+                "where the first node came to lie; below 0 with open ends",
+                "frames",
+            ),
             table_field("eta", pa.list_(pa.int32()), "stretch of each segment", "frames at the common rate"),
             table_field(
                 "source_time",
@@ -206,6 +223,29 @@ TABLES: dict[str, pa.Schema] = {
             _CLIP,
             table_field("frame", pa.int32(), "frame of the reference at the common rate"),
             *_POSE,
+        ]
+    ),
+    "styles": pa.schema(
+        [
+            _CLIP,
+            table_field("cluster_id", pa.int32(), "cluster"),
+            table_field("reference_id", pa.string(), "clip that was subtracted"),
+            table_field("kind", pa.string(), "rotations (rad), or pose (leg lengths) where rigs differ"),
+            table_field("energy", pa.float64(), "sum of the joints' energies", "rad^2 or leg lengths^2"),
+            *(
+                table_field(f"energy_{region}", pa.float64(), "sum over the region's joints", "as energy")
+                for region in REGIONS
+            ),
+            table_field("joints", pa.list_(pa.string()), "joints of the residual"),
+            table_field("joint_energy", _FLOATS, "mean square of each joint's residual", "as energy"),
+            table_field(
+                "travel_energy",
+                _FLOATS,
+                "mean square of the root's left, forward, turning and height",
+                "(leg lengths/s)^2 twice, (rad/s)^2, leg lengths^2",
+            ),
+            table_field("scores", _FLOATS, "where the clip lies in its cluster's style space (PCA)"),
+            table_field("explained", _FLOATS, "share of the cluster's variance along each axis"),
         ]
     ),
     "quarantine": pa.schema(

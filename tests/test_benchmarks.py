@@ -10,11 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motionary.pipeline.alignment import cotw
+from tests.alignment.naive import Problem
 from tests.benchmarks import __main__ as program
+from tests.benchmarks import alignment, alignment_clips
 from tests.benchmarks.agreement import compared, with_ourselves, with_peers
 from tests.benchmarks.clips import ClipSet
 from tests.benchmarks.contests import Contestant, alternate
 from tests.benchmarks.limits import recurrence
+from tests.benchmarks.naive_cotw import naive_cotw
 from tests.benchmarks.report import _target
 from tests.distances import naive
 
@@ -146,3 +150,60 @@ def test_the_peers_constraints_hold_versions_only():
     for line in lines:
         assert re.fullmatch(r"[\w.-]+==[\w.!+]+", line), line
     assert {"aeon", "dtaidistance", "tslearn"} <= {line.split("==")[0] for line in lines}
+
+
+def test_the_alignments_benchmark_runs_with_and_without_real_clips(tmp_path):
+    out = tmp_path / "made" / "alignment.json"
+    command = [sys.executable, "-m", "tests.benchmarks.alignment", "--quick", "--json", str(out)]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    record = json.loads(out.read_text())
+    assert {pool["num_threads"] for pool in record["machine"]["blas"]} == {"1"}
+    figures = {one["what"]: one for one in record["figures"]}
+    assert figures["times faster than naive"]["measured"] > 0
+    assert figures["the whole grid of it, 660: seconds"]["measured"] > 0
+    assert all(one["met"] for one in figures.values() if one["binding"])
+    real = [what for what in figures if "HDM05" in what]
+    assert bool(real) == alignment.REAL_DATA.is_dir() == ("no real clips" not in told.stderr)
+    assert "figures mean nothing" in told.stdout
+    assert "MISSED" not in told.stdout
+
+
+def test_without_real_clips_their_figures_are_left_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(alignment, "REAL_DATA", tmp_path / "absent")
+    assert alignment.main(["--quick", "--json", str(tmp_path / "out.json")]) == 0
+    assert "no real clips" in capsys.readouterr().err
+
+
+def test_another_optimum_makes_the_alignments_benchmark_fail(tmp_path, monkeypatch):
+    def wrong(*arguments):
+        objective, eta = naive_cotw(*arguments)
+        return objective * (1 + 1e-6), eta
+
+    monkeypatch.setattr(alignment, "REAL_DATA", tmp_path / "absent")
+    monkeypatch.setattr(alignment, "naive_cotw", wrong)
+    assert alignment.main(["--quick", "--json", str(tmp_path / "out.json")]) == 1
+
+
+def test_a_search_below_length_matching_is_counted():
+    pair = tuple(alignment_clips.smooth_sequence(frames, 3, seed=frames) for frames in (50, 40))
+    good = alignment.searched([pair])[0]
+    bent = cotw(pair[0], -pair[1], 10, 6)
+    assert alignment.never_below_uniform([pair, pair], [good, bent]).measured == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_naive_alignment_is_the_one_of_the_plain_recursion(seed):
+    rng = np.random.default_rng(seed)
+    moving, reference = rng.normal(size=(21, 2)).cumsum(axis=0), rng.normal(size=(23, 2)).cumsum(axis=0)
+    objective, eta = naive_cotw(moving, reference, 7, 3)
+    best, (_, etas) = Problem(moving, reference, 7).best(3)
+    assert objective == pytest.approx(best, abs=1e-9)
+    assert eta == etas
+
+
+def test_an_alignments_figure_is_met_from_the_right_side():
+    assert alignment.Figure("", 90, required=80, at_least=True).met
+    assert not alignment.Figure("", 90, required=80).met
+    assert not alignment.Figure("", float("nan"), required=80).met
+    assert alignment.Figure("", 90).met is None

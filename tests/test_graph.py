@@ -5,7 +5,13 @@ import time
 import pyarrow as pa
 import pytest
 
-from motionary.pipeline.config import ClusterConfig, DistanceConfig, FeatureConfig, PipelineConfig
+from motionary.pipeline.config import (
+    AlignmentConfig,
+    ClusterConfig,
+    DistanceConfig,
+    FeatureConfig,
+    PipelineConfig,
+)
 from motionary.pipeline.graph import batched_by_name, build_graph
 from motionary.pipeline.readers.library import Source
 
@@ -59,7 +65,7 @@ def test_a_clip_more_leaves_most_results_as_they_were(place):
 
 def test_keys_cover_what_matters_to_a_stage_and_what_follows():
     sources, plain = library(40), keys(library(40))
-    everything = {"ingest", "compare", "cluster", "represent", "align"}
+    everything = {"ingest", "compare", "cluster", "represent", "align", "style"}
     assert changed(plain, keys(sources)) == set()
     assert changed(plain, keys(sources, PipelineConfig(features=FeatureConfig(epsilon=0.2)))) == everything
     drawn = PipelineConfig(distances=DistanceConfig(thresholds="random"))
@@ -67,9 +73,13 @@ def test_keys_cover_what_matters_to_a_stage_and_what_follows():
     seed = PipelineConfig(distances=DistanceConfig(seed=1))
     assert changed(plain, keys(sources, seed)) == set()
     primary = PipelineConfig(clusters=ClusterConfig(primary="complete"))
-    assert changed(plain, keys(sources, primary)) == {"cluster", "represent", "align"}
+    assert changed(plain, keys(sources, primary)) == {"cluster", "represent", "align", "style"}
     labels = pa.table({"clip_id": ["clip-00001.bvh"], "action": ["walk"]})
-    assert changed(plain, keys(sources, labels=labels)) == {"cluster", "represent", "align"}
+    assert changed(plain, keys(sources, labels=labels)) == {"cluster", "represent", "align", "style"}
+    weighted = PipelineConfig(alignment=AlignmentConfig(weights="legs"))
+    assert changed(plain, keys(sources, weighted)) == {"represent", "align", "style"}
+    thorough = PipelineConfig(alignment=AlignmentConfig(search="full"))
+    assert changed(plain, keys(sources, thorough)) == {"align", "style"}
     other = [Source(s.clip_id, s.path, s.root, s.files, s.digest + "!", s.format) for s in sources[:1]]
     assert changed(plain, keys(other + sources[1:])) == everything
 

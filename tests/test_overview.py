@@ -27,6 +27,7 @@ from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.stages.align import align
 from motionary.pipeline.stages.cluster import cluster
 from motionary.pipeline.stages.represent import represent
+from motionary.pipeline.stages.style import style
 from motionary.pipeline.synthetic import template
 
 NASTY = '<script>alert("x")</script>&<b>'
@@ -73,10 +74,11 @@ def make_catalog(folder, demo, clip_ids, labels=NO_LABELS, config=None, quaranti
     frames, features = own("frames", "clip_id"), own("features", "clip_id")
     pairs = own("pairs", "clip_a", "clip_b")
     made = cluster(ingested, pairs, labels, config)
-    made |= represent(made["clips"], made["members"], pairs, features, config)
+    made |= represent(made["clips"], made["members"], pairs, features, config, AlignmentConfig())
     made |= align(
         ingested, frames, features, made["clusters"], made["reference_features"], AlignmentConfig(), 30.0
     )
+    made |= style(made["clips"], made["clusters"], made["aligned"], (), 30.0)
     made |= {"frames": frames, "features": features, "pairs": pairs, "resampled": own("resampled", "clip_id")}
     made["quarantine"] = pa.Table.from_pylist(list(quarantine), schema=SCHEMAS["quarantine"])
     run = demo.runs.to_arrow().to_pylist()[-1]

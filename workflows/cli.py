@@ -94,6 +94,14 @@ def run(
     threshold: Annotated[
         float | None, typer.Option("--threshold", "--mu", min=0, help="Cut the dendrogram at this height.")
     ] = None,
+    weights: Annotated[
+        Literal["full", "legs", "arms"] | None,
+        typer.Option("--weights", help="Part of the body that alignment attends to.", show_default="full"),
+    ] = None,
+    full_grid: Annotated[
+        bool,
+        typer.Option("--full-grid", help="Search every segment length and slack of every alignment: slower."),
+    ] = False,
     travel: Annotated[
         bool,
         typer.Option("--travel/--no-travel", help="Whether the direction of travel tells motions apart."),
@@ -117,6 +125,9 @@ def run(
     options["clusters"] |= {name: value for name, value in given.items() if value is not None}
     if not travel:
         options["features"]["travel_time"] = 0.0
+    options["alignment"] = ({"weights": weights} if weights else {}) | (
+        {"search": "full"} if full_grid else {}
+    )
     _run([library, *(also or [])], catalog, _settings(config, options), labels, workers, scheduler)
 
 
@@ -186,39 +197,6 @@ def graph(
 
 
 @app.command()
-def reproduce(
-    name: Annotated[
-        Literal["dtw-curve", "dtw-curve-better"],
-        typer.Argument(metavar="NAME", help="dtw-curve or dtw-curve-better."),
-    ],
-    catalog: CatalogUrl,
-    draws: Annotated[int, typer.Option("--draws", min=1, help="Sets of clips drawn by each rule.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
-    label_column: Annotated[
-        str, typer.Option("--label-column", help="Column that holds the classes.")
-    ] = "action",
-    format_: OutputFormat = "table",
-) -> None:
-    """Repeat a paper's experiment on the labelled clips of CATALOG.
-
-    dtw-curve: which distance, linkage and features find the classes. dtw-curve-better: changes to the
-    default.
-    """
-    from functools import partial
-
-    from motionary.workflows.progress import progress
-    from motionary.workflows.reproduce import EXPERIMENTS
-    from motionary.workflows.tables import output_console, write_table
-
-    conduct, report = EXPERIMENTS[name]
-    experiment = conduct(_open(catalog), label_column, draws, seed, partial(progress, console=_stderr()))
-    if format_ == "table":
-        output_console().print(report(experiment))
-    else:
-        write_table(experiment.study.to_arrow(), format_)
-
-
-@app.command()
 def export(
     catalog: CatalogUrl,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the files go; made if missing.")],
@@ -285,6 +263,63 @@ def transfer(
     made = transfer_to_bvh(_open(catalog), out, style, onto)
     print(f"wrote {out}: {made.motion.frames} frames, in the time of {made.reference_id}")
     output_console().print(sliding_table(made))
+
+
+@app.command()
+def reproduce(
+    name: Annotated[
+        Literal["dtw-curve", "dtw-curve-better", "cotw", "style"],
+        typer.Argument(metavar="NAME", help="dtw-curve, dtw-curve-better, cotw or style."),
+    ],
+    catalog: Annotated[
+        str | None, typer.Argument(metavar="CATALOG", help="Labelled catalog; style needs none.")
+    ] = None,
+    draws: Annotated[
+        int | None,
+        typer.Option(
+            "--draws",
+            min=1,
+            help="Sets of clips drawn by each rule; for cotw, pairs of each action.",
+            show_default="100, cotw 10",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
+    label_column: Annotated[
+        str, typer.Option("--label-column", help="Column that holds the classes.")
+    ] = "action",
+    format_: OutputFormat = "table",
+) -> None:
+    """Repeat a paper's experiment on the labelled clips of CATALOG, or on the embedded library.
+
+    dtw-curve: which distance, linkage and features find the classes. dtw-curve-better: changes to the
+    default. cotw: which alignment brings clips of one action together. style: how well styles are told apart
+    by what alignment leaves over, on made-up takes.
+    """
+    from functools import partial
+
+    from motionary.workflows.progress import progress
+    from motionary.workflows.tables import output_console, write_table
+
+    show = partial(progress, console=_stderr())
+    if name == "style":
+        from motionary.workflows.reproduce.style import study_style, style_report
+
+        if catalog is not None:
+            raise typer.BadParameter("style is made on the embedded library and takes no CATALOG")
+        study = study_style(show, seed=seed)
+        printed = style_report(study)
+    else:
+        from motionary.workflows.reproduce import EXPERIMENTS
+
+        if catalog is None:
+            raise typer.BadParameter(f"{name} needs a labelled CATALOG")
+        conduct, report, usual = EXPERIMENTS[name]
+        experiment = conduct(_open(catalog), label_column, draws or usual, seed, show)
+        study, printed = experiment.study, report(experiment)
+    if format_ == "table":
+        output_console().print(printed)
+    else:
+        write_table(study.to_arrow(), format_)
 
 
 def main() -> NoReturn:

@@ -24,6 +24,7 @@ _COLOURS = {
     "cluster": "#009e73",
     "represent": "#cc79a7",
     "align": "#56b4e9",
+    "style": "#e69f00",
 }
 
 

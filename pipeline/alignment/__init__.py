@@ -1,7 +1,7 @@
 """Motions in the time of a reference: every method is ``method(moving, reference, ...) -> Warp``."""
 
 from motionary.pipeline.alignment.correlation import mean_correlation
-from motionary.pipeline.alignment.cotw import CotwWarp, cotw, default_parameters
+from motionary.pipeline.alignment.cotw import CotwWarp, cotw
 from motionary.pipeline.alignment.path_warp import PathWarp, dtw
 from motionary.pipeline.alignment.reference import (
     ReferenceScores,
@@ -13,7 +13,7 @@ from motionary.pipeline.alignment.search import cotw_search
 from motionary.pipeline.alignment.trajectories import computed_trajectories, roughness
 from motionary.pipeline.alignment.uniform import uniform
 from motionary.pipeline.alignment.warp import Warp
-from motionary.pipeline.alignment.weights import PRESETS, joint_weights
+from motionary.pipeline.joint_weights import PRESETS, joint_weights
 
 __all__ = [
     "PRESETS",
@@ -24,7 +24,6 @@ __all__ = [
     "computed_trajectories",
     "cotw",
     "cotw_search",
-    "default_parameters",
     "dtw",
     "joint_weights",
     "mean_correlation",

@@ -17,11 +17,12 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.alignment.cotw import Spacing, placed_nodes
+from motionary.pipeline.alignment.cotw import placed_nodes
 from motionary.pipeline.alignment.grid import GridWarp, all_warps
 from motionary.pipeline.alignment.matched import MatchedPair
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH, Segments, stretchable
 from motionary.pipeline.alignment.whole_output import WholeOutput
+from motionary.pipeline.config import Spacing
 
 COARSE_FRAMES = 72
 # From this length on the coarse grid tries every second; lengths nearby are tried at the end.

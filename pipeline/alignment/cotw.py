@@ -29,7 +29,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import index
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +43,10 @@ from motionary.pipeline.alignment.nodes import (
 )
 from motionary.pipeline.alignment.warp import Warp
 from motionary.pipeline.alignment.whole_output import WholeOutput
+from motionary.pipeline.config import Spacing
 from motionary.pipeline.motion import FloatArray
 
-Spacing = Literal["equal", "boundaries"]
-SPACINGS: tuple[Spacing, ...] = ("equal", "boundaries")
 _TIE = 1e-12
-_MOST_DEFAULT_SLACK = 60  # two seconds at 30 frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,33 +138,6 @@ def cotw(
     return warp_of(pair, whole, nodes, moved, length, most)
 
 
-def default_parameters(reference_frames: int, segment_length: int | None = None) -> tuple[int, int]:
-    """Return the segment length and slack taken where none are given.
-
-    Parameters
-    ----------
-    reference_frames : int
-        m.
-    segment_length : int, optional
-        L where that is given; of more than m frames there are m.
-
-    Returns
-    -------
-    segment_length, slack : int
-        L = m / 4 (rounded, halves to even), between 8 and floor(m / 2); slack = L - 4, the most the method
-        allows, but at most 60 frames, so that the time it takes grows with m and not with its cube. Below 10
-        frames, where halves would leave no slack, a single segment of all m frames.
-    """
-    half = reference_frames // 2
-    if segment_length is not None:
-        length = min(segment_length, reference_frames)
-    elif half > LEAST_LENGTH:
-        length = min(max(round(reference_frames / 4), 8), half)
-    else:
-        length = reference_frames
-    return length, min(max(length - LEAST_LENGTH, 0), _MOST_DEFAULT_SLACK)
-
-
 def placed_nodes(
     pair: MatchedPair, segment_length: int, segments: int, spacing: Spacing
 ) -> NDArray[np.int64]:
@@ -178,8 +148,8 @@ def placed_nodes(
     ValueError
         There is no such spacing.
     """
-    if spacing not in SPACINGS:
-        raise ValueError(f"spacing is {spacing!r}; it must be one of {', '.join(map(repr, SPACINGS))}")
+    if spacing not in ("equal", "boundaries"):
+        raise ValueError(f"spacing is {spacing!r}; it must be 'equal' or 'boundaries'")
     nodes = equal_nodes(pair.frames, segment_length)[: segments + 1]
     nodes[-1] = pair.frames - 1
     if spacing == "boundaries":

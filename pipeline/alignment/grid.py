@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.cotw import (
-    Spacing,
     best_moves,
     correlation_tables,
     placed_nodes,
@@ -24,6 +23,7 @@ from motionary.pipeline.alignment.cotw import (
 )
 from motionary.pipeline.alignment.matched import MatchedPair
 from motionary.pipeline.alignment.nodes import stretchable
+from motionary.pipeline.config import Spacing
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,20 +10,18 @@ slack that is used up.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
 
 import numpy as np
 
 from motionary.pipeline.alignment.coarse_to_fine import refined_warps
-from motionary.pipeline.alignment.cotw import CotwWarp, Spacing, warp_of
+from motionary.pipeline.alignment.cotw import CotwWarp, warp_of
 from motionary.pipeline.alignment.grid import GridWarp, all_warps
 from motionary.pipeline.alignment.matched import matched_pair
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH
 from motionary.pipeline.alignment.whole_output import WholeOutput
+from motionary.pipeline.config import Effort, Spacing
 from motionary.pipeline.motion import FloatArray
 
-Effort = Literal["full", "fast"]
-EFFORTS: tuple[Effort, ...] = ("full", "fast")
 SHORTEST_SEGMENT = 8
 # Up to here the whole grid takes some tens of milliseconds.
 _FRAMES_OF_A_FULL_GRID = 96
@@ -72,8 +70,8 @@ def cotw_search(
     ValueError
         Shapes disagree, a value is not finite, all weights are 0, or an option is unknown.
     """
-    if effort not in EFFORTS:
-        raise ValueError(f"effort is {effort!r}; it must be one of {', '.join(map(repr, EFFORTS))}")
+    if effort not in ("full", "fast"):
+        raise ValueError(f"effort is {effort!r}; it must be 'full' or 'fast'")
     if not (np.isfinite(alpha) and alpha >= 0):
         raise ValueError(f"alpha is {alpha}; it must be finite and not negative")
     pair = matched_pair(moving, reference, weights)

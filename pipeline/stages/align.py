@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pyarrow as pa
 
-from motionary.pipeline.alignment import CotwWarp, cotw, default_parameters, mean_correlation, uniform
+from motionary.pipeline.alignment import CotwWarp, cotw, cotw_search, joint_weights
+from motionary.pipeline.alignment.nodes import LEAST_LENGTH
 from motionary.pipeline.config import AlignmentConfig
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.stages.columns import POSE_COLUMNS, matrix, per_clip
 from motionary.pipeline.stages.motions import motion_rows, read_motions
 from motionary.pipeline.tables import TABLES
 
-VERSION = 1
+VERSION = 2
 MAKES = ("alignments", "aligned")
 
 
@@ -34,7 +34,7 @@ def align(
     clusters, reference_features : pyarrow.Table
         Of the whole library.
     config : AlignmentConfig
-        Segment length and slack.
+        The search, or the segments and slack, and the weights.
     frame_rate : float
         Frames a second of the features.
 
@@ -56,7 +56,7 @@ def align(
         moving = _pose(sequences[clip_id])
         warp = _warp(moving, reference, config)
         alignments.append(
-            _alignment_row(clip_id, cluster_id, reference_id, moving, reference, warp, frame_rate)
+            _alignment_row(clip_id, cluster_id, reference_id, moving, reference, warp, config, frame_rate)
         )
         aligned.append(_aligned_rows(clip_id, motion, warp, frame_rate))
     return {"alignments": pa.concat_tables(alignments), "aligned": pa.concat_tables(aligned)}
@@ -67,10 +67,26 @@ def _pose(rows: pa.Table) -> FloatArray:
 
 
 def _warp(moving: FloatArray, reference: FloatArray, config: AlignmentConfig) -> CotwWarp:
-    length, slack = default_parameters(len(reference), config.segment_length)
+    weights, frames = joint_weights(config.weights), len(reference)
+    if config.segment_length is None and config.segments is None:
+        return cotw_search(
+            moving, reference, weights, config.alpha,
+            effort=config.search, spacing=config.spacing, open_ends=config.open_ends,
+        )  # fmt: skip
+    # Of a reference that is too short for the setting, what it has.
+    if config.segments is None:
+        length = min(config.segment_length or frames, frames)
+        segments = max(1, frames // length)
+    else:
+        segments = min(config.segments, max(1, frames // LEAST_LENGTH))
+        length = frames // segments
+    slack = max(length - LEAST_LENGTH, 0)
     if config.slack is not None:
-        slack = min(config.slack, max(length - 4, 0))
-    return cotw(moving, reference, length, slack)
+        slack = min(config.slack, slack)
+    return cotw(
+        moving, reference, slack=slack, weights=weights,
+        segments=segments, spacing=config.spacing, open_ends=config.open_ends,
+    )  # fmt: skip
 
 
 def _alignment_row(
@@ -80,8 +96,10 @@ def _alignment_row(
     moving: FloatArray,
     reference: FloatArray,
     warp: CotwWarp,
+    config: AlignmentConfig,
     frame_rate: float,
 ) -> pa.Table:
+    unwarped = cotw(moving, reference, segments=1, weights=joint_weights(config.weights))
     row = {
         "clip_id": clip_id,
         "cluster_id": cluster_id,
@@ -90,9 +108,12 @@ def _alignment_row(
         "segment_length": warp.segment_length,
         "slack": warp.slack,
         "objective": warp.objective,
-        "correlation_before": mean_correlation(uniform(moving, reference).apply(moving), reference),
-        "correlation": mean_correlation(warp.apply(moving), reference),
-        "eta": np.asarray(warp.eta).tolist(),
+        "correlation_before": unwarped.correlation,
+        "correlation": warp.correlation,
+        "distortion": warp.distortion,
+        "nodes": warp.nodes.tolist(),
+        "first_frame": warp.first_frame,
+        "eta": warp.eta.tolist(),
         "source_time": warp.source_time.tolist(),
     }
     return pa.Table.from_pylist([row], schema=TABLES["alignments"])

@@ -7,18 +7,23 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from scipy.spatial.distance import squareform
 
-from motionary.pipeline.alignment import score_references
+from motionary.pipeline.alignment import joint_weights, score_references
 from motionary.pipeline.clustering import Names, name_clusters
-from motionary.pipeline.config import ClusterConfig
+from motionary.pipeline.config import AlignmentConfig, ClusterConfig
 from motionary.pipeline.stages.columns import POSE_COLUMNS, condensed, condensed_places, matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
-VERSION = 1
+VERSION = 2
 MAKES = ("clusters", "references", "reference_features")
 
 
 def represent(
-    clips: pa.Table, members: pa.Table, pairs: pa.Table, features: pa.Table, config: ClusterConfig
+    clips: pa.Table,
+    members: pa.Table,
+    pairs: pa.Table,
+    features: pa.Table,
+    config: ClusterConfig,
+    alignment: AlignmentConfig,
 ) -> dict[str, pa.Table]:
     """Choose each cluster's reference by the similarity index [CoTW 5] and name clusters and clips [DC 5].
 
@@ -34,6 +39,8 @@ def represent(
         Every clip's frames at the common rate.
     config : ClusterConfig
         The distance, the label column and the reach of a name.
+    alignment : AlignmentConfig
+        The weights, which the similarity index shares with the alignment.
 
     Returns
     -------
@@ -47,13 +54,14 @@ def represent(
     places = condensed_places(pairs, clips["clip_id"])
     square, weighted = (squareform(condensed(pairs, name, places)) for name in (config.metric, "weighted"))
     sequences = per_clip(features)
+    weights = joint_weights(alignment.weights)
 
     reference_of: dict[int, int] = {}
     similarity: dict[int, float] = {}
     for one in np.unique(cluster_of).tolist():
         inside = np.flatnonzero(cluster_of == one)
         poses = [matrix(sequences[clip_ids[i]]["feature"])[:, :POSE_COLUMNS] for i in inside]
-        scores = score_references(poses, distances=weighted[np.ix_(inside, inside)])
+        scores = score_references(poses, weights, distances=weighted[np.ix_(inside, inside)])
         reference_of[one] = int(inside[scores.index])
         similarity[one] = float(scores.similarity[scores.index])
 

@@ -153,7 +153,7 @@ def test_the_fast_search_loses_little_on_real_clips(shared_data) -> None:
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        ({"effort": "quick"}, "effort is 'quick'; it must be one of 'full', 'fast'"),
+        ({"effort": "quick"}, "effort is 'quick'; it must be 'full' or 'fast'"),
         ({"alpha": -0.5}, "alpha is -0.5; it must be finite and not negative"),
         ({"alpha": np.nan}, "alpha is nan"),
         ({"weights": [0, 0]}, "all weights are 0; the mean correlation needs one that is not"),

@@ -1,11 +1,28 @@
-"""The papers' experiments, on a labelled catalog of one's own."""
+"""The papers' experiments, on a labelled catalog of one's own or on the embedded library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from motionary.workflows.reproduce.better import better_report, study_better
+from motionary.workflows.reproduce.cotw import study_cotw
+from motionary.workflows.reproduce.cotw_report import cotw_report
 from motionary.workflows.reproduce.dtw_curve import study_dtw_curve
 from motionary.workflows.reproduce.report import report
 
+
+class Experiment(NamedTuple):
+    """What conducts an experiment, what lays it out for reading, and how many draws are usual."""
+
+    conduct: Callable[..., Any]
+    report: Callable[..., Any]
+    draws: int
+
+
 EXPERIMENTS = {
-    "dtw-curve": (study_dtw_curve, report),
-    "dtw-curve-better": (study_better, better_report),
+    "dtw-curve": Experiment(study_dtw_curve, report, 100),
+    "dtw-curve-better": Experiment(study_better, better_report, 100),
+    "cotw": Experiment(study_cotw, cotw_report, 10),
 }
-"""By name: what conducts an experiment, and what lays it out for reading."""
+"""By name."""

@@ -1,0 +1,74 @@
+"""Aligned clips -> what each does that its reference does not, and where that lies in the style space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pyarrow as pa
+
+from motionary.pipeline.canonical import Convention
+from motionary.pipeline.stages.columns import per_clip
+from motionary.pipeline.stages.motions import read_motion_rows
+from motionary.pipeline.style import Residual, StyleSpace, residuals
+from motionary.pipeline.tables import TABLES
+
+VERSION = 1
+MAKES = ("styles",)
+
+
+def style(
+    clips: pa.Table,
+    clusters: pa.Table,
+    aligned: pa.Table,
+    conventions: Sequence[Convention],
+    frame_rate: float,
+) -> dict[str, pa.Table]:
+    """Subtract each cluster's reference from its clips.
+
+    Parameters
+    ----------
+    clips, clusters, aligned : pyarrow.Table
+        Of the whole library.
+    conventions : sequence of Convention
+        A user's own joint-name conventions.
+    frame_rate : float
+        Frames a second of the aligned clips.
+
+    Returns
+    -------
+    dict of str to pyarrow.Table
+        `styles`, in the order of the clips.
+    """
+    clip_rows = {clip["clip_id"]: clip for clip in clips.to_pylist()}
+    frames = per_clip(aligned)
+    members: dict[int, list[str]] = {}
+    reference_of: dict[int, str] = {}
+    for row in clusters.to_pylist():
+        members.setdefault(row["cluster_id"], []).append(row["clip_id"])
+        if row["is_reference"]:
+            reference_of[row["cluster_id"]] = row["clip_id"]
+
+    rows: dict[str, dict] = {}
+    for cluster_id, clip_ids in members.items():
+        motions = {one: read_motion_rows(clip_rows[one], frames[one], frame_rate) for one in clip_ids}
+        reference_id = reference_of[cluster_id]
+        found = residuals([*motions.values()], motions[reference_id], conventions=conventions)
+        space = StyleSpace.fit([one.vector() for one in found])
+        for clip_id, one, scores in zip(clip_ids, found, space.scores, strict=True):
+            place = {"clip_id": clip_id, "cluster_id": cluster_id, "reference_id": reference_id}
+            explained = space.explained_variance_ratio.tolist()
+            rows[clip_id] = place | _energies(one) | {"scores": scores.tolist(), "explained": explained}
+    in_order = [rows[clip_id] for clip_id in clip_rows]
+    return {"styles": pa.Table.from_pylist(in_order, schema=TABLES["styles"])}
+
+
+def _energies(residual: Residual) -> dict:
+    by_region = residual.region_energy
+    return {
+        "kind": residual.kind,
+        "energy": sum(by_region.values()),
+        **{f"energy_{region}": energy for region, energy in by_region.items()},
+        "joints": list(residual.names),
+        "joint_energy": list(residual.joint_energy.values()),
+        "travel_energy": list(residual.root_energy.values()),
+    }
