@@ -209,7 +209,9 @@ class Motion:
         after = np.minimum(before + 1, self.frames - 1)
         share = times - before
         root = (1 - share)[:, None] * self.root_position[before] + share[:, None] * self.root_position[after]
-        rotations = slerp(self.rotations[before], self.rotations[after], share[:, None])
+        rotations = self.rotations[before]
+        between = np.flatnonzero(share)  # on a frame there is nothing to turn
+        rotations[between] = slerp(rotations[between], self.rotations[after[between]], share[between, None])
         return replace(self, root_position=root, rotations=rotations)
 
 
