@@ -222,3 +222,33 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog):
     )  # fmt: skip
     assert len(shown.stdout.splitlines()) == 2
     assert shown.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["cotw"], "cotw needs a labelled CATALOG"),
+        (["style", "somewhere"], "takes no CATALOG"),
+        (["dtw"], "'dtw' is not one of 'dtw-curve', 'dtw-curve-better', 'cotw', 'style'"),
+    ],
+)
+def test_reproduce_tells_what_an_experiment_is_made_on(motionary, arguments, problem):
+    code, out, log = motionary("reproduce", *arguments)
+    assert (code, out) == (2, "")
+    assert problem in " ".join(log.replace("│", " ").split())
+
+
+@pytest.mark.slow
+def test_reproduce_cotw_prints_its_tables_and_writes_its_values(motionary, demo_catalog):
+    code, out, _ = motionary("reproduce", "cotw", demo_catalog, "--draws", 1)
+    assert code == 0
+    assert "CoTW" in out
+    code, out, _ = motionary("reproduce", "cotw", demo_catalog, "--draws", 1, "--format", "csv")
+    assert code == 0
+    assert out.splitlines()[0].count(",") >= 3
+
+
+def test_run_takes_what_alignment_attends_to(motionary, tmp_path, demo_library):
+    code, _, log = motionary("run", demo_library, tmp_path / "catalog", "--weights", "hands")
+    assert code == 2
+    assert "'hands' is not one of 'full', 'legs', 'arms'" in " ".join(log.replace("│", " ").split())

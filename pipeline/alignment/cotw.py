@@ -33,6 +33,7 @@ from operator import index
 import numpy as np
 from numpy.typing import NDArray
 
+from motionary.pipeline.alignment.correlation_tables import CorrelationTables, correlation_tables
 from motionary.pipeline.alignment.matched import MatchedPair, matched_pair
 from motionary.pipeline.alignment.nodes import (
     LEAST_LENGTH,
@@ -157,80 +158,6 @@ def placed_nodes(
     return nodes
 
 
-@dataclass(frozen=True, eq=False)
-class CorrelationTables:
-    """J of every segment, stretch and output place that a warp can reach.
-
-    Parameters
-    ----------
-    values : array (cells,)
-        The tables of c segments one after another, each [eta - least_eta, output frame - first].
-    start : array (c + 1,)
-        Where each begins.
-    least_eta, most_eta : array (c,)
-        Rows.
-    first, places : array (c,)
-        Columns: the output frame of the first, and their number.
-    """
-
-    values: FloatArray
-    start: NDArray[np.int64]
-    least_eta: NDArray[np.int64]
-    most_eta: NDArray[np.int64]
-    first: NDArray[np.int64]
-    places: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Deviations:
-    """Inverse norms of the reference's centred windows, spans from `least` on; one serves a whole search."""
-
-    inverse: FloatArray
-    least: int
-
-
-def reference_deviations(pair: MatchedPair, least: int, most: int) -> Deviations:
-    """Compute the inverse norms of all windows of `least` to `most` frames from end to end."""
-    from motionary.pipeline.alignment.cotw_kernels import inverse_deviations
-
-    most = max(least, min(most, pair.frames - 1))
-    return Deviations(inverse_deviations(pair.target, pair.frames, pair.target_floor, least, most), least)
-
-
-def correlation_tables(
-    pair: MatchedPair, segments: Segments, deviations: Deviations | None = None
-) -> CorrelationTables:
-    """Compute J wherever the segments can go.
-
-    Parameters
-    ----------
-    pair : MatchedPair
-    segments : Segments
-    deviations : Deviations, optional
-        Of at least the spans needed; made here where not given.
-
-    Returns
-    -------
-    CorrelationTables
-        They serve smaller slacks and narrower ranges too: no cell depends on them.
-    """
-    from motionary.pipeline.alignment.cotw_kernels import fill_tables
-
-    spans, low, high = np.diff(segments.nodes), segments.low, segments.high
-    least_eta = np.maximum(-segments.slacks, low[1:] - high[:-1] - spans)
-    most_eta = np.minimum(segments.slacks, high[1:] - low[:-1] - spans)
-    places = high[:-1] - low[:-1] + 1
-    start = np.append(0, np.cumsum((most_eta - least_eta + 1) * places))
-    if deviations is None:
-        deviations = reference_deviations(pair, int((spans + least_eta).min()), int((spans + most_eta).max()))
-    values = np.zeros(start[-1])
-    fill_tables(
-        pair.source, pair.target, segments.nodes, low, high, least_eta, most_eta, start, pair.weights,
-        pair.source_floor, pair.target_floor, deviations.inverse, deviations.least, values,
-    )  # fmt: skip
-    return CorrelationTables(values, start, least_eta, most_eta, low[:-1], places)
-
-
 def best_moves(tables: CorrelationTables, segments: Segments, total_weight: float) -> NDArray[np.int64]:
     """Run Table 1's dynamic programme over the correlations.
 
@@ -266,7 +193,7 @@ def warp_of(
     slack: int,
 ) -> CotwWarp:
     """Return the warp that brings the nodes to output frames `moved`; its times are the original's."""
-    from motionary.pipeline.alignment.cotw_kernels import sum_of_correlations
+    from motionary.pipeline.alignment.correlation_kernels import sum_of_correlations
 
     correlation, distortion = whole(nodes, moved)
     times = np.interp(np.arange(pair.frames), moved, nodes)

@@ -15,12 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.alignment.cotw import (
-    best_moves,
-    correlation_tables,
-    placed_nodes,
-    reference_deviations,
-)
+from motionary.pipeline.alignment.correlation_tables import correlation_tables, reference_deviations
+from motionary.pipeline.alignment.cotw import best_moves, placed_nodes
 from motionary.pipeline.alignment.matched import MatchedPair
 from motionary.pipeline.alignment.nodes import stretchable
 from motionary.pipeline.config import Spacing

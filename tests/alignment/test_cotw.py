@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionary.pipeline.alignment import CotwWarp, cotw, uniform
-from motionary.pipeline.alignment.cotw import best_moves, correlation_tables, warp_of
+from motionary.pipeline.alignment.correlation_tables import correlation_tables
+from motionary.pipeline.alignment.cotw import best_moves, warp_of
 from motionary.pipeline.alignment.matched import matched_pair
 from motionary.pipeline.alignment.nodes import equal_nodes, stretchable
 from motionary.pipeline.alignment.rounding import rounding_level

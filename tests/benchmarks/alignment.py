@@ -13,13 +13,11 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from motionary.pipeline.alignment import CotwWarp, cotw, cotw_search, mean_correlation, uniform
 from motionary.pipeline.alignment.warp import interpolate
@@ -32,6 +30,7 @@ from tests.benchmarks.alignment_clips import (
     smooth_sequence,
     to_references,
 )
+from tests.benchmarks.alignment_report import Figure, as_row, print_figures
 from tests.benchmarks.contests import Contestant, alternate
 from tests.benchmarks.machine import describe_machine, held_to_one_core, let_onto, one_thread
 from tests.benchmarks.naive_cotw import naive_cotw
@@ -48,51 +47,16 @@ ROUNDING = 1e-9
 THREADS = 2
 
 
-@dataclass(frozen=True)
-class Figure:
-    """One figure of the report.
-
-    Parameters
-    ----------
-    what : str
-        With its unit.
-    measured : float
-    form : str
-        How it is printed.
-    required : float, optional
-        At most, or `at_least`.
-    binding : bool
-        Whether the program fails where it is missed.
-    samples : list of float
-        What a median was taken of, in seconds.
-    """
-
-    what: str
-    measured: float
-    form: str = ".2f"
-    required: float | None = None
-    at_least: bool = False
-    binding: bool = False
-    samples: list[float] = field(default_factory=list)
-
-    @property
-    def met(self) -> bool | None:
-        """Whether it is as required; None where nothing is. What is no number is not."""
-        if self.required is None:
-            return None
-        return self.measured >= self.required if self.at_least else self.measured <= self.required
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmarks; return the exit code."""
     options = _parser().parse_args(arguments)
     with held_to_one_core() as cores:
         figures = _measure(options.quick, cores)
         machine = describe_machine(cores)
-    record = {"machine": machine, "quick": options.quick, "figures": [_as_record(one) for one in figures]}
+    record = {"machine": machine, "quick": options.quick, "figures": [as_row(one) for one in figures]}
     options.json.parent.mkdir(parents=True, exist_ok=True)
     options.json.write_text(json.dumps(record, indent=1) + "\n")
-    _print(record, Console(width=WIDTH))
+    print_figures(record, Console(width=WIDTH))
     _say(f"all samples: {options.json}")
     return 0 if all(one.met for one in figures if one.binding) else 1
 
@@ -249,31 +213,6 @@ def seconds(work: Callable[[], object]) -> float:
     began = time.perf_counter()
     work()
     return time.perf_counter() - began
-
-
-def _as_record(figure: Figure) -> dict:
-    return asdict(figure) | {"met": figure.met}
-
-
-def _print(record: dict, console: Console) -> None:
-    machine = record["machine"]
-    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    if record["quick"]:
-        console.print("A quick run, to see that it runs: its figures mean nothing.", highlight=False)
-    console.print(
-        f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}", highlight=False
-    )
-    console.print(f"{packages}; one thread but where more are named; medians", highlight=False)
-    table = Table()
-    for column in ("figure", "measured", "required", ""):
-        table.add_column(column, justify="right" if column == "measured" else "left")
-    verdicts = {None: "", True: "met", False: "MISSED"}
-    for row in record["figures"]:
-        sign = ">=" if row["at_least"] else "<="
-        asked = "" if row["required"] is None else f"{sign} {row['required']:g}"
-        verdict = "" if record["quick"] and not row["binding"] else verdicts[row["met"]]
-        table.add_row(row["what"], format(row["measured"], row["form"]), asked, verdict)
-    console.print(table)
 
 
 def _say(step: str) -> None:
