@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 
 _MODULES = (
+    "motionary.pipeline.alignment.agreement_kernels",
     "motionary.pipeline.alignment.correlation_kernels",
     "motionary.pipeline.alignment.cotw_kernels",
     "motionary.pipeline.alignment.whole_output_kernels",

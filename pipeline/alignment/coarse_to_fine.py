@@ -1,11 +1,12 @@
-"""A search for long sequences: the whole grid of a coarser version, its best warps refined [CoTW 4].
+"""A search for long sequences: warps that are likely to be worth much, refined level by level [CoTW 4].
 
-The grid's time grows with the fourth power of the number of frames. So both sequences are brought to 72
-frames, every segment length and slack is tried there, and the warps of greatest eq. 8 value, a few for each
-number of segments, are carried up level by level, each about twice as long as the last. On every level
-inner nodes are moved one at a time while that raises the value, within the slack.
+The grid's time grows with the fourth power of the number of frames. So both sequences are brought to at
+most 144 frames, the warps that maximise an additive version of eq. 8 are found there for every segment length
+(`likely_warps`), and those of greatest eq. 8 value, a few for each number of segments, are carried up level
+by level, each at most twice as long as the last. On every level inner nodes are moved one or two at a time
+while that raises the value, within the slack.
 
-What comes out keeps to CoTW's constraints; it maximises eq. 8 itself from where Table 1 led, and so is often
+What comes out keeps to CoTW's constraints; it maximises eq. 8 and not Table 1's sum, and so is most often
 worth a little more than the grid's best.
 """
 
@@ -18,18 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.cotw import placed_nodes
-from motionary.pipeline.alignment.grid import GridWarp, all_warps
+from motionary.pipeline.alignment.grid import GridWarp
+from motionary.pipeline.alignment.likely_warps import likely_warps
 from motionary.pipeline.alignment.matched import MatchedPair
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH, Segments, stretchable
 from motionary.pipeline.alignment.whole_output import WholeOutput
 from motionary.pipeline.config import Spacing
 
-COARSE_FRAMES = 72
-# From this length on the coarse grid tries every second; lengths nearby are tried at the end.
-_DENSE = 16
-# How many warps are refined: of the coarse grid; of those as many as have one number of segments; and from
+COARSE_FRAMES = 144
+# From this length on every second is tried on the coarsest level; those nearby are tried at the end.
+_DENSE = 32
+# How many warps are refined: of the coarsest level; of those as many as have one number of segments; and from
 # level to level as many as have these frames together, so that long sequences take no longer than others.
-_CARRIED, _OF_EACH_COUNT, _FRAMES_CARRIED = 30, 5, 2400
+_CARRIED, _OF_EACH_COUNT, _FRAMES_CARRIED = 20, 4, 1600
 # The best third are tried with segments a little shorter and longer too.
 _NEARBY = (-2, -1, 1, 2)
 # Frames by which nodes are first moved, on each level.
@@ -55,7 +57,7 @@ def refined_warps(
     level = pair.at_length(coarse)
     least, shortest_here = (ceil(length * coarse / pair.frames) for length in (LEAST_LENGTH, shortest))
     lengths = [*range(shortest_here, _DENSE), *range(max(shortest_here, _DENSE), coarse // 2 + 1, 2)]
-    warps = list(all_warps(level, lengths, least, spacing, open_ends))
+    warps = list(likely_warps(level, lengths, least, alpha, spacing, open_ends))
     carried = _worth_refining(warps, WholeOutput(level), alpha)
     for frames in levels:
         level = pair.at_length(frames)
@@ -114,9 +116,10 @@ class _Refinement:
 
 
 def _levels(frames: int) -> list[int]:
-    """Numbers of frames from the coarsest to all, each at most twice the one before."""
+    """Numbers of frames from the coarsest, at most COARSE_FRAMES, to all, each at most twice the last."""
     steps = max(1, ceil(log2(frames / COARSE_FRAMES)))
-    return [round(COARSE_FRAMES * (frames / COARSE_FRAMES) ** (step / steps)) for step in range(steps + 1)]
+    coarse = min(frames, COARSE_FRAMES)
+    return [round(coarse * (frames / coarse) ** (step / steps)) for step in range(steps + 1)]
 
 
 def _worth_refining(warps: list[GridWarp], whole: WholeOutput, alpha: float) -> list[GridWarp]:

@@ -63,7 +63,7 @@ def fill_tables(
     least: int,
     values: FloatArray,
 ) -> None:
-    """Fill the tables of all segments, one after another: see `correlation_tables.CorrelationTables`."""
+    """Fill the tables of all segments, one after another: see `correlation_tables.TableLayout`."""
     frames = len(source)
     for k in range(len(nodes) - 1):
         places = high[k] - low[k] + 1

@@ -18,13 +18,13 @@ from motionary.pipeline.motion import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class CorrelationTables:
-    """J of every segment, stretch and output place that a warp can reach.
+class TableLayout:
+    """Where the cells of c segments' tables stand in one array, one table after another.
+
+    A segment's table is [eta - least_eta, output frame of its first node - first].
 
     Parameters
     ----------
-    values : array (cells,)
-        The tables of c segments one after another, each [eta - least_eta, output frame - first].
     start : array (c + 1,)
         Where each begins.
     least_eta, most_eta : array (c,)
@@ -33,12 +33,35 @@ class CorrelationTables:
         Columns: the output frame of the first, and their number.
     """
 
-    values: FloatArray
     start: NDArray[np.int64]
     least_eta: NDArray[np.int64]
     most_eta: NDArray[np.int64]
     first: NDArray[np.int64]
     places: NDArray[np.int64]
+
+
+def table_layout(segments: Segments) -> TableLayout:
+    """Lay out tables for every stretch and output place that the segments can reach."""
+    spans, low, high = np.diff(segments.nodes), segments.low, segments.high
+    least_eta = np.maximum(-segments.slacks, low[1:] - high[:-1] - spans)
+    most_eta = np.minimum(segments.slacks, high[1:] - low[:-1] - spans)
+    places = high[:-1] - low[:-1] + 1
+    start = np.append(0, np.cumsum((most_eta - least_eta + 1) * places))
+    return TableLayout(start, least_eta, most_eta, low[:-1], places)
+
+
+@dataclass(frozen=True, eq=False)
+class CorrelationTables:
+    """J of every segment, stretch and output place that a warp can reach.
+
+    Parameters
+    ----------
+    values : array (cells,)
+    layout : TableLayout
+    """
+
+    values: FloatArray
+    layout: TableLayout
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +99,14 @@ def correlation_tables(
     """
     from motionary.pipeline.alignment.correlation_kernels import fill_tables
 
-    spans, low, high = np.diff(segments.nodes), segments.low, segments.high
-    least_eta = np.maximum(-segments.slacks, low[1:] - high[:-1] - spans)
-    most_eta = np.minimum(segments.slacks, high[1:] - low[:-1] - spans)
-    places = high[:-1] - low[:-1] + 1
-    start = np.append(0, np.cumsum((most_eta - least_eta + 1) * places))
+    layout, spans = table_layout(segments), np.diff(segments.nodes)
     if deviations is None:
-        deviations = reference_deviations(pair, int((spans + least_eta).min()), int((spans + most_eta).max()))
-    values = np.zeros(start[-1])
+        least, most = (spans + layout.least_eta).min(), (spans + layout.most_eta).max()
+        deviations = reference_deviations(pair, int(least), int(most))
+    values = np.zeros(layout.start[-1])
     fill_tables(
-        pair.source, pair.target, segments.nodes, low, high, least_eta, most_eta, start, pair.weights,
-        pair.source_floor, pair.target_floor, deviations.inverse, deviations.least, values,
+        pair.source, pair.target, segments.nodes, segments.low, segments.high, layout.least_eta,
+        layout.most_eta, layout.start, pair.weights, pair.source_floor, pair.target_floor,
+        deviations.inverse, deviations.least, values,
     )  # fmt: skip
-    return CorrelationTables(values, start, least_eta, most_eta, low[:-1], places)
+    return CorrelationTables(values, layout)

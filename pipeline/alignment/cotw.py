@@ -176,9 +176,9 @@ def best_moves(tables: CorrelationTables, segments: Segments, total_weight: floa
     """
     from motionary.pipeline.alignment.cotw_kernels import best_path
 
-    moved = np.empty(len(segments.nodes), dtype=np.int64)
+    layout, moved = tables.layout, np.empty(len(segments.nodes), dtype=np.int64)
     best_path(
-        tables.values, tables.start, tables.least_eta, tables.most_eta, tables.first, tables.places,
+        tables.values, layout.start, layout.least_eta, layout.most_eta, layout.first, layout.places,
         segments.nodes, segments.slacks, segments.low, segments.high, _TIE * total_weight, moved,
     )  # fmt: skip
     return moved

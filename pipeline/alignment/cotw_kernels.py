@@ -62,7 +62,7 @@ def best_path(
     Parameters
     ----------
     values, start, least_eta, most_eta, first, places : arrays
-        The tables: see `correlation_tables.CorrelationTables`.
+        The tables: see `correlation_tables.TableLayout`.
     nodes : array (c + 1,)
         In the input.
     slacks : array (c,)
