@@ -172,13 +172,14 @@ class AlignmentConfig:
     segment_length : int, optional
         L, frames at the common rate; the length of a stride, for example. Of more than a reference has, all.
     segments : int, optional
-        The number of segments instead, such as the number of actions shown.
+        The number of segments instead, such as the number of actions shown; of a reference too short for
+        them, as many as have 4 frames. Segments of 4 frames, like a single one, cannot be stretched.
     slack : int, optional
         delta, frames, where `segment_length` or `segments` is given; by default the largest the method
         allows, L - 4 [CoTW 4], and never more.
     weights : {"full", "legs", "arms"} or mapping
         What the alignment attends to: a preset of Table 2, or canonical joints and their weights; see
-        `motionary.pipeline.alignment.joint_weights`.
+        `motionary.pipeline.joint_weights.joint_weights`.
     spacing : {"equal", "boundaries"}
         Nodes every L frames, or each where the reference pauses nearby.
     open_ends : bool
@@ -197,7 +198,8 @@ class AlignmentConfig:
     def __post_init__(self) -> None:
         _one_of("search", self.search, ("fast", "full"))
         _one_of("spacing", self.spacing, ("equal", "boundaries"))
-        _at_least("alpha", self.alpha, 0.0)
+        if not 0 <= self.alpha < float("inf"):
+            raise ValueError(f"alpha is {self.alpha}; it must be at least 0 and finite")
         if self.segment_length is not None and self.segments is not None:
             raise ValueError(
                 f"segment_length ({self.segment_length}) and segments ({self.segments}) are both given; "

@@ -105,7 +105,8 @@ def test_settings_reach_the_alignment(demo):
         ({"segment_length": 10, "slack": 7}, "slack may be at most segment_length - 4 = 6"),
         ({"search": "all"}, "search"),
         ({"spacing": "even"}, "spacing"),
-        ({"alpha": -1}, "alpha is -1.0; it must be at least 0"),
+        ({"alpha": -1}, "alpha is -1.0; it must be at least 0 and finite"),
+        ({"alpha": float("inf")}, "alpha is inf"),
     ],
 )
 def test_a_setting_that_cannot_be_is_named(settings, problem):

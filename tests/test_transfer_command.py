@@ -9,8 +9,9 @@ import pytest
 
 from motionary.catalog import Catalog
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.style import foot_sliding, transfer
+from motionary.pipeline.style import fastest_joint, foot_sliding, transfer
 from motionary.workflows import cli
+from motionary.workflows.transfer import StyleTransfer
 
 
 @pytest.fixture
@@ -66,9 +67,15 @@ def test_transfer_writes_a_playable_bvh_and_prints_how_feet_slide(motionary, dem
     order = [read.skeleton.index(name) for name in made.skeleton.names]
     np.testing.assert_allclose(read.positions()[:, order], made.positions(), atol=1e-3)
     assert f"wrote {out}: {made.frames} frames, in the time of {reference}" in printed
-    shown = dict(re.findall(r"^(style|onto|result) +([\d.]+)$", printed, flags=re.MULTILINE))
-    speeds = [foot_sliding(motion) for motion in (*sources, made)]
-    assert [float(shown[role]) for role in ("style", "onto", "result")] == pytest.approx(speeds, abs=0.006)
+    rows = re.findall(r"^(style|onto|result) +([\d.]+) +([\d.]+)$", printed, flags=re.MULTILINE)
+    assert [role for role, _, _ in rows] == ["style", "onto", "result"]
+    motions = (*sources, made)
+    assert [float(speed) for _, speed, _ in rows] == pytest.approx(
+        [foot_sliding(motion) for motion in motions], abs=0.006
+    )
+    assert [float(speed) for _, _, speed in rows] == pytest.approx(
+        [fastest_joint(motion) for motion in motions], abs=0.06
+    )
     assert "a leg taken to be 0.90 m" in printed
     assert [file.name for file in out.parent.iterdir()] == ["out.bvh"]
 
@@ -185,3 +192,9 @@ def test_a_clip_that_fails_is_told_and_the_exit_code_is_3(motionary, demo_catalo
     assert printed == f"wrote 1 clip as BVH, as captured, to {tmp_path}\n"
     assert log.splitlines()[-1] == f"motionary: {style} is not exported: {in_the_way}: Is a directory"
     assert (tmp_path / onto).is_file()
+
+
+@pytest.mark.parametrize(("result", "is_jerky"), [(5.9, False), (6.1, True)])
+def test_a_result_with_a_flip_in_it_is_told(result, is_jerky):
+    fastest = {"style": 2.0, "onto": 3.0, "result": result}
+    assert StyleTransfer(None, "a.bvh", {}, fastest).is_jerky == is_jerky

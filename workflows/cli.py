@@ -100,7 +100,10 @@ def run(
     ] = None,
     full_grid: Annotated[
         bool,
-        typer.Option("--full-grid", help="Search every segment length and slack of every alignment: slower."),
+        typer.Option(
+            "--full-grid",
+            help="Search every segment length and slack for references over 96 frames too: slower.",
+        ),
     ] = False,
     travel: Annotated[
         bool,
@@ -263,6 +266,13 @@ def transfer(
     made = transfer_to_bvh(_open(catalog), out, style, onto)
     print(f"wrote {out}: {made.motion.frames} frames, in the time of {made.reference_id}")
     output_console().print(sliding_table(made))
+    if made.is_jerky:
+        _stderr().print(
+            "a joint of the result is more than twice as fast as the sources': rotations that flip in the "
+            f"source of {style}, {onto} or {made.reference_id} look so; look at it before you use it",
+            highlight=False,
+            soft_wrap=True,
+        )
 
 
 @app.command()

@@ -14,7 +14,7 @@ from motionary.catalog import Catalog
 from motionary.catalog.export_plan import refuse_library
 from motionary.pipeline.canonical import Convention
 from motionary.pipeline.motion import Motion
-from motionary.pipeline.style import foot_sliding, transfer
+from motionary.pipeline.style import fastest_joint, foot_sliding, transfer
 from motionary.pipeline.style.contact import USUAL_LEG
 from motionary.pipeline.writers import write_bvh
 from motionary.workflows.errors import UserError
@@ -33,11 +33,19 @@ class StyleTransfer:
         The clip that both are aligned to.
     sliding : dict of str to float
         Foot sliding, cm/s, of `style` and `onto`, both aligned, and of `result`.
+    fastest : dict of str to float
+        Greatest speed of a joint, leg lengths a second, of the same.
     """
 
     motion: Motion
     reference_id: str
     sliding: dict[str, float]
+    fastest: dict[str, float]
+
+    @property
+    def is_jerky(self) -> bool:
+        """Whether some joint of the result is more than twice as fast as any of the sources'."""
+        return self.fastest["result"] > 2 * max(self.fastest["style"], self.fastest["onto"])
 
 
 def transfer_to_bvh(catalog: Catalog, out: Path, style: str, onto: str) -> StyleTransfer:
@@ -88,15 +96,19 @@ def transfer_style(catalog: Catalog, style: str, onto: str) -> StyleTransfer:
     except ValueError as error:
         raise UserError(f"style cannot be transferred in the time of {reference_id}: {error}") from error
     motions = {"style": styled, "onto": plain, "result": motion}
-    sliding = {role: foot_sliding(one, conventions) for role, one in motions.items()}
-    return StyleTransfer(motion, reference_id, sliding)
+    sliding, fastest = (
+        {role: measure(one, conventions) for role, one in motions.items()}
+        for measure in (foot_sliding, fastest_joint)
+    )
+    return StyleTransfer(motion, reference_id, sliding, fastest)
 
 
 def sliding_table(made: StyleTransfer) -> RenderableType:
-    """List the foot sliding of the sources and the result."""
-    rows = [[role, f"{speed:.2f}"] for role, speed in made.sliding.items()]
+    """List the foot sliding and the fastest joint of the sources and the result."""
+    rows = [[role, f"{speed:.2f}", f"{made.fastest[role]:.1f}"] for role, speed in made.sliding.items()]
     guess = "" if made.motion.unit is not None else f", a leg taken to be {USUAL_LEG:.2f} m"
-    return text_table(["motion", "cm/s"], rows, f"Foot sliding while the foot stands{guess}")
+    title = f"Foot sliding while the foot stands{guess}; the fastest joint"
+    return text_table(["motion", "sliding, cm/s", "fastest, legs/s"], rows, title)
 
 
 def _reference(catalog: Catalog, style: str, onto: str) -> str:

@@ -98,6 +98,8 @@ def cotw(
 ) -> CotwWarp:
     """Warp one sequence so that its segments correlate best with the reference's [CoTW 3].
 
+    Either `segment_length` or `segments` is needed; `cotw_search` finds both length and slack.
+
     Parameters
     ----------
     moving : array (n, dofs)

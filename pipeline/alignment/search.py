@@ -51,8 +51,9 @@ def cotw_search(
         Weight of distortion against correlation; the paper suggests .5.
     effort : {"full", "fast"}
         The whole grid, whose time grows with the fourth power of m (some seconds for 300 frames); or, above
-        96 frames, warps that maximise an additive version of eq. 8, refined (`coarse_to_fine`). Such a warp keeps to its L and slack and has the value that is told, but
-        Table 1's optimum at that L and slack may be another one.
+        96 frames, warps that maximise an additive version of eq. 8, refined (`coarse_to_fine`). Such a warp
+        keeps to its L and slack and has the value that is told, but Table 1's optimum at that L and slack
+        may be another one.
     spacing : {"equal", "boundaries"}
         As in `cotw`.
     open_ends : bool

@@ -3,10 +3,10 @@
 In reading order: `rig` (which joints belong together), `root_motion` (the root in its own heading frame),
 `residual` (clip minus reference), `space` (the principal axes of a cluster's residuals), `separability` (how
 well labels are predicted from them), `transfer` (a residual added to another clip), `contact` (how far feet
-slide while they stand).
+slide while they stand, and the fastest joint).
 """
 
-from motionary.pipeline.style.contact import foot_sliding
+from motionary.pipeline.style.contact import fastest_joint, foot_sliding
 from motionary.pipeline.style.residual import Residual, ResidualKind, residual, residuals
 from motionary.pipeline.style.rig import REGIONS, joint_regions
 from motionary.pipeline.style.separability import style_accuracy
@@ -18,6 +18,7 @@ __all__ = [
     "Residual",
     "ResidualKind",
     "StyleSpace",
+    "fastest_joint",
     "foot_sliding",
     "joint_regions",
     "residual",

@@ -158,10 +158,12 @@ def residuals(
     Raises
     ------
     ValueError
-        Frames or rates differ, or rotations are asked for and the skeletons differ.
+        Frames or rates differ, rotations are asked for and the skeletons differ, or there is no such kind.
     SkeletonError
         No convention fits a skeleton, or it has no legs.
     """
+    if kind not in (None, "rotations", "pose"):
+        raise ValueError(f"kind is {kind!r}; it must be 'rotations' or 'pose'")
     others = [one for one in aligned if not is_one_rig(one.skeleton, reference.skeleton)]
     if kind == "rotations" and others:
         raise ValueError(

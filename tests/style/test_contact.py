@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.style import foot_sliding
-from motionary.pipeline.synthetic import BODIES, synthetic_library
+from motionary.pipeline.style import fastest_joint, foot_sliding
+from motionary.pipeline.style.root_motion import features_by_frame
+from motionary.pipeline.synthetic import BODIES, synthetic_library, template
 from tests.style.figures import moved, performed
 
 
@@ -69,3 +70,16 @@ def test_real_walkers_slide_a_little(shared_data: Path):
     found = [foot_sliding(read_motion(path)) for path in clips]
     assert 0 < min(found)
     assert max(found) < 20
+
+
+def test_the_fastest_joint_is_told_in_leg_lengths():
+    take = template("kick")
+    leg = features_by_frame(take, ()).leg_length
+    places = take.positions()
+    by_hand = max(
+        np.linalg.norm(places[frame + 1, joint] - places[frame, joint])
+        for frame in range(take.frames - 1)
+        for joint in range(places.shape[1])
+    )
+    assert fastest_joint(take) == pytest.approx(by_hand * take.fps / leg)
+    assert fastest_joint(take.sampled([0.0])) == 0.0
