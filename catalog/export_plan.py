@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import unicodedata
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from typing import Literal
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from fsspec.implementations.local import LocalFileSystem
 
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.query import Catalog, nearest
@@ -66,6 +68,8 @@ def plan_export(
     """
     if format_ not in ("bvh", "npz", "parquet"):
         raise CatalogError(f"format is {format_!r}; a motion is exported as bvh, npz or parquet")
+    if not str(folder):
+        raise CatalogError("the folder to export into has no name; for the working directory write .")
     if clips is not None and cluster is not None:
         raise CatalogError("clips and a cluster are given; a selection is by one of them")
     table: Literal["frames", "aligned"] = "aligned" if aligned else "frames"
@@ -89,7 +93,8 @@ def plan_export(
 def file_names(clip_ids: Sequence[str], suffix: str) -> dict[str, str]:
     """Name a file for every clip: its clip_id with another suffix, in the same folders.
 
-    Clips whose names would be equal, in upper or lower case, keep their own suffix before the new one, as
+    Clips whose names would be equal, in upper or lower case or however accents are written, or equal to a
+    folder's, keep their own suffix before the new one, as
     `walk.amc.bvh` and `walk.bvh.bvh`; where that does not help, a digest of the clip_id stands there too.
 
     Raises
@@ -110,12 +115,17 @@ def file_names(clip_ids: Sequence[str], suffix: str) -> dict[str, str]:
         names = {clip_id: longer[length](clip_id) for clip_id, length in lengths.items()}
         sharing = defaultdict(list)
         for clip_id, name in names.items():
-            sharing[name.casefold()].append(clip_id)
-        alike = [one for group in sharing.values() if len(group) > 1 for one in group]
+            sharing[_as_file_systems_see(name)].append(clip_id)
+        folders = {str(folder) for name in sharing for folder in PurePosixPath(name).parents}
+        alike = [one for name, group in sharing.items() if len(group) > 1 or name in folders for one in group]
         if not alike:
             return names
         for clip_id in alike:
             lengths[clip_id] = min(lengths[clip_id] + 1, len(longer) - 1)
+
+
+def _as_file_systems_see(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def rows_of(table: pa.Table, clip_ids: Sequence[str] | pa.ChunkedArray) -> pa.Table:
@@ -175,13 +185,18 @@ def _described(catalog: Catalog, clip_ids: Sequence[str], aligned: bool) -> pa.T
 
 
 def refuse_library(catalog: Catalog, paths: Sequence[Path]) -> None:
-    """Check that no file would be written into the library that the catalog was last made from.
+    """Check that no file would be written into the catalog, or the library that it was last made from.
 
     Raises
     ------
     CatalogError
-        One would: the next run would read it as a clip, and it may be a capture that is replaced.
+        One would: a catalog holds nothing but its own files; the library's next run would read it as a clip,
+        and it may be a capture that is replaced.
     """
+    if isinstance(catalog.store.filesystem, LocalFileSystem):
+        home = Path(catalog.store.path("")).resolve()
+        if any(path.resolve().is_relative_to(home) for path in paths):
+            raise CatalogError(f"{paths[0]} lies in the catalog {home} itself; name a folder outside")
     runs = catalog.runs.to_arrow()
     roots = [Path(root).resolve() for root in runs["library"][-1].as_py()] if len(runs) else []
     for root in roots:

@@ -166,7 +166,8 @@ class AlignmentConfig:
     ----------
     search : {"fast", "full"}
         How segment length and slack are found where neither a length nor a number of segments is given: the
-        whole grid for references of up to 96 frames and coarse to fine above (default), or the whole grid.
+        whole grid for references of up to 96 frames and coarse to fine above (default), or the whole grid
+        for those of up to 2,000.
     alpha : float
         Weight of distortion against correlation in the search; .5 as in the paper.
     segment_length : int, optional

@@ -85,8 +85,11 @@ def test_settings_reach_the_alignment(demo):
     for row in aligned_with(demo, segment_length=1000, slack=5):
         assert row["eta"] == [0]
         assert row["correlation"] == pytest.approx(row["correlation_before"])
-    for row in aligned_with(demo, segment_length=10, slack=2):
+    for row in aligned_with(demo, segment_length=11, slack=2):
+        assert (row["segment_length"], row["slack"]) == (11, 2)
+        assert row["nodes"][:-1] == [11 * k for k in range(len(row["eta"]))]
         assert max(map(abs, row["eta"])) <= 2
+    assert {row["slack"] for row in aligned_with(demo, segment_length=11, slack=0)} == {0}
     legs, arms = aligned_with(demo, weights="legs"), aligned_with(demo, weights={"wrist": 1, "elbow": 0.5})
     assert [row["correlation_before"] for row in legs] != [row["correlation_before"] for row in arms]
     assert [row["source_time"] for row in aligned_with(demo, alpha=0)] != [

@@ -1,6 +1,7 @@
 """Motions leave a catalog as files that others read, whole, and without surprises."""
 
 import shutil
+import unicodedata
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -318,3 +319,18 @@ def test_an_empty_catalog_and_an_old_one(tmp_path):
     with pytest.raises(CatalogError, match="no table 'aligned'"):
         _ = old.aligned_frames
     assert not (tmp_path / "out").exists()
+
+
+def test_names_are_told_apart_as_file_systems_see_them():
+    names = file_names(["d.bvh/x.bvh", "d.amc", "cafe\u0301.bvh", "caf\u00e9.amc", "alone.bvh"], ".bvh")
+    assert names["d.bvh/x.bvh"] == "d.bvh/x.bvh"
+    assert names["d.amc"] == "d.amc.bvh"  # d.bvh is a folder
+    assert names["alone.bvh"] == "alone.bvh"
+    assert len({unicodedata.normalize("NFC", name) for name in names.values()}) == 5
+
+
+@pytest.mark.parametrize(("folder", "problem"), [("", "has no name"), ("inside", "in the catalog .* itself")])
+def test_an_export_goes_neither_nowhere_nor_into_the_catalog(demo_catalog, folder, problem):
+    with pytest.raises(CatalogError, match=problem):
+        Catalog.open(demo_catalog).export(f"{demo_catalog}/{folder}" if folder else "", "npz")
+    assert not Path(demo_catalog, "inside").exists()

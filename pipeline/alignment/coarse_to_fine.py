@@ -56,6 +56,7 @@ def refined_warps(
     coarse, *levels = _levels(pair.frames)
     level = pair.at_length(coarse)
     least, shortest_here = (ceil(length * coarse / pair.frames) for length in (LEAST_LENGTH, shortest))
+    shortest_here = max(shortest_here, least + 1)
     lengths = [*range(shortest_here, _DENSE), *range(max(shortest_here, _DENSE), coarse // 2 + 1, 2)]
     warps = list(likely_warps(level, lengths, least, alpha, spacing, open_ends))
     carried = _worth_refining(warps, WholeOutput(level), alpha)

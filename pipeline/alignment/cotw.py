@@ -20,7 +20,8 @@ Where we differ from the paper:
 - Two of its limits are lifted where asked for. Nodes may lie unequally (`nodes.boundary_nodes`). With
   `open_ends` the first node may come to lie up to `slack` frames before the output and the last as far after
   it: then the reference's ends meet other frames of the input. Of a segment that hangs over, what lies within
-  is compared, at least 4 frames from end to end; sum eta is how far the last node was moved less the first.
+  is compared, at least 4 frames from end to end (of the last 3, as its length may be); sum eta is how far the
+  last node was moved less the first.
 - Ties go to the least |eta|, the shorter segment first, in order of the segments. Sums that differ by less
   than 1e-12 of the weights' sum are ties, so that rounding alone never bends time.
 """
@@ -141,6 +142,12 @@ def cotw(
     return warp_of(pair, whole, nodes, moved, length, most)
 
 
+def check_spacing(spacing: str) -> None:
+    """Raise ValueError where there is no such spacing."""
+    if spacing not in ("equal", "boundaries"):
+        raise ValueError(f"spacing is {spacing!r}; it must be 'equal' or 'boundaries'")
+
+
 def placed_nodes(
     pair: MatchedPair, segment_length: int, segments: int, spacing: Spacing
 ) -> NDArray[np.int64]:
@@ -151,8 +158,7 @@ def placed_nodes(
     ValueError
         There is no such spacing.
     """
-    if spacing not in ("equal", "boundaries"):
-        raise ValueError(f"spacing is {spacing!r}; it must be 'equal' or 'boundaries'")
+    check_spacing(spacing)
     nodes = equal_nodes(pair.frames, segment_length)[: segments + 1]
     nodes[-1] = pair.frames - 1
     if spacing == "boundaries":

@@ -31,6 +31,15 @@ def fill_bounds(
         if k < segments:
             before += slacks[k]
             after -= slacks[k]
+    # What one node cannot reach keeps its neighbours too from where they could not meet it.
+    for k in range(1, segments + 1):
+        span = nodes[k] - nodes[k - 1]
+        low[k] = max(low[k], low[k - 1] + span - slacks[k - 1])
+        high[k] = min(high[k], high[k - 1] + span + slacks[k - 1])
+    for k in range(segments - 1, -1, -1):
+        span = nodes[k + 1] - nodes[k]
+        low[k] = max(low[k], low[k + 1] - span - slacks[k])
+        high[k] = min(high[k], high[k + 1] - span + slacks[k])
 
 
 @_kernel

@@ -68,9 +68,10 @@ def matched_pair(moving: FloatArray, reference: FloatArray, weights: FloatArray 
     weights = checked_weights(weights, reference.shape[1])
     kept = np.flatnonzero(weights)
     matched = interpolate(moving[:, kept].astype(np.float64), uniform_times(len(moving), len(reference)))
+    target = reference[:, kept].astype(np.float64)
     return MatchedPair(
         source=matched - matched.mean(axis=0),
-        target=_with_room(reference[:, kept] - reference[:, kept].mean(axis=0, dtype=np.float64)),
+        target=_with_room(target - target.mean(axis=0)),
         weights=weights[kept],
         total_weight=float(weights.sum()),
         source_floor=rounding_level(moving)[kept] ** 2,

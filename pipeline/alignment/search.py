@@ -14,7 +14,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from motionary.pipeline.alignment.coarse_to_fine import refined_warps
-from motionary.pipeline.alignment.cotw import CotwWarp, warp_of
+from motionary.pipeline.alignment.cotw import CotwWarp, check_spacing, warp_of
 from motionary.pipeline.alignment.grid import GridWarp, all_warps
 from motionary.pipeline.alignment.matched import matched_pair
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH
@@ -25,6 +25,8 @@ from motionary.pipeline.motion import FloatArray
 SHORTEST_SEGMENT = 8
 # Up to here the whole grid takes some tens of milliseconds.
 _FRAMES_OF_A_FULL_GRID = 96
+MOST_GRID_FRAMES = 2000
+"""The longest reference for which the whole grid is searched: it takes an hour and some gigabytes."""
 
 
 def cotw_search(
@@ -50,7 +52,8 @@ def cotw_search(
     alpha : float
         Weight of distortion against correlation; the paper suggests .5.
     effort : {"full", "fast"}
-        The whole grid, whose time grows with the fourth power of m (some seconds for 300 frames); or, above
+        The whole grid, whose time grows with the fourth power of m (some seconds for 300 frames, and with
+        open ends some ten times that) and its memory with the square; or, above
         96 frames, warps that maximise an additive version of eq. 8, refined (`coarse_to_fine`). Such a warp
         keeps to its L and slack and has the value that is told, but Table 1's optimum at that L and slack
         may be another one.
@@ -68,14 +71,21 @@ def cotw_search(
     Raises
     ------
     ValueError
-        Shapes disagree, a value is not finite, all weights are 0, or an option is unknown.
+        Shapes disagree, a value is not finite, all weights are 0, an option is unknown, or the whole grid
+        is asked for more than `MOST_GRID_FRAMES`.
     """
     if effort not in ("full", "fast"):
         raise ValueError(f"effort is {effort!r}; it must be 'full' or 'fast'")
+    check_spacing(spacing)
     if not (np.isfinite(alpha) and alpha >= 0):
         raise ValueError(f"alpha is {alpha}; it must be finite and not negative")
     pair = matched_pair(moving, reference, weights)
     whole = WholeOutput(pair)
+    if effort == "full" and pair.frames > MOST_GRID_FRAMES:
+        raise ValueError(
+            f"the whole grid for a reference of {pair.frames} frames would take hours (at most "
+            f"{MOST_GRID_FRAMES}); search with effort='fast'"
+        )
     if effort == "full" or pair.frames <= _FRAMES_OF_A_FULL_GRID:
         warps: Iterable[GridWarp] = all_warps(
             pair, range(SHORTEST_SEGMENT, pair.frames // 2 + 1), LEAST_LENGTH, spacing, open_ends

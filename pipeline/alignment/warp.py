@@ -13,6 +13,8 @@ import numpy as np
 from motionary.pipeline.features import sample_times
 from motionary.pipeline.motion import FloatArray, Motion
 
+_LARGEST = np.float64(1e150)  # as such: a plain float would be narrowed to float32 beside float32
+
 
 @dataclass(frozen=True, eq=False)
 class Warp:
@@ -155,15 +157,19 @@ def checked_sequence(values: FloatArray, name: str) -> FloatArray:
     Raises
     ------
     ValueError
-        It has other than two axes, no frame or no DOF, or a value that is not finite.
+        It has other than two axes, no frame or no DOF, values that are not real numbers, or one that is not
+        finite or too large to be squared.
     """
     array = np.asarray(values)
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{name} holds values of type {array.dtype}; they must be real numbers")
     if array.ndim != 2 or not array.size:
         raise ValueError(f"{name} has shape {array.shape}; it needs (frames, dofs), at least one of each")
-    finite = np.isfinite(array)
-    if not finite.all():
-        frame, dof = np.argwhere(~finite)[0]
+    usable = np.abs(array) <= _LARGEST  # false for what is not a number
+    if not usable.all():
+        frame, dof = np.argwhere(~usable)[0]
         raise ValueError(
-            f"{name} holds {array[frame, dof]} at frame {frame}, DOF {dof}; values must be finite"
+            f"{name} holds {array[frame, dof]} at frame {frame}, DOF {dof}; "
+            f"values must be finite, at most {_LARGEST:g}"
         )
     return array

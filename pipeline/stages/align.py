@@ -6,6 +6,7 @@ import pyarrow as pa
 
 from motionary.pipeline.alignment import CotwWarp, cotw, cotw_search, joint_weights
 from motionary.pipeline.alignment.nodes import LEAST_LENGTH
+from motionary.pipeline.alignment.search import MOST_GRID_FRAMES
 from motionary.pipeline.config import AlignmentConfig
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.stages.columns import POSE_COLUMNS, matrix, per_clip
@@ -69,22 +70,22 @@ def _pose(rows: pa.Table) -> FloatArray:
 def _warp(moving: FloatArray, reference: FloatArray, config: AlignmentConfig) -> CotwWarp:
     weights, frames = joint_weights(config.weights), len(reference)
     if config.segment_length is None and config.segments is None:
+        effort = "fast" if frames > MOST_GRID_FRAMES else config.search
         return cotw_search(
             moving, reference, weights, config.alpha,
-            effort=config.search, spacing=config.spacing, open_ends=config.open_ends,
+            effort=effort, spacing=config.spacing, open_ends=config.open_ends,
         )  # fmt: skip
     # Of a reference that is too short for the setting, what it has.
-    if config.segments is None:
-        length = min(config.segment_length or frames, frames)
-        segments = max(1, frames // length)
+    length, segments = config.segment_length, config.segments
+    if segments is None:
+        length = min(length or frames, frames)
+        longest = length
     else:
-        segments = min(config.segments, max(1, frames // LEAST_LENGTH))
-        length = frames // segments
-    slack = max(length - LEAST_LENGTH, 0)
-    if config.slack is not None:
-        slack = min(config.slack, slack)
+        segments = min(segments, max(1, frames // LEAST_LENGTH))
+        longest = frames // segments
+    most = max(longest - LEAST_LENGTH, 0)
     return cotw(
-        moving, reference, slack=slack, weights=weights,
+        moving, reference, length, most if config.slack is None else min(config.slack, most), weights,
         segments=segments, spacing=config.spacing, open_ends=config.open_ends,
     )  # fmt: skip
 

@@ -162,4 +162,21 @@ def test_the_fast_search_loses_little_on_real_clips(shared_data) -> None:
 )
 def test_what_cannot_be_searched_is_refused(options: dict, problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
-        cotw_search(np.zeros((20, 2)), np.zeros((30, 2)), **options)
+        cotw_search(np.zeros((20, 2)), np.zeros((10, 2)), **options)
+
+
+def test_a_grid_that_would_not_end_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"a reference of 2001 frames would take hours .* effort='fast'"):
+        cotw_search(np.zeros((20, 2)), np.zeros((2001, 2)))
+
+
+def test_open_ends_keep_what_is_seen_of_the_first_and_last_segment() -> None:
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        moving = rng.normal(size=(int(rng.integers(20, 200)), 2)).cumsum(axis=0)
+        reference = rng.normal(size=(int(rng.integers(97, 180)), 2)).cumsum(axis=0)
+        warp = cotw_search(moving, reference, effort="fast", open_ends=True)
+        places = moved(warp)
+        assert (np.abs(warp.eta) <= warp.slack).all()
+        assert places[1] >= 4
+        assert places[-2] <= len(reference) - 1 - 3
