@@ -31,7 +31,7 @@ COARSE_FRAMES = 144
 _DENSE = 32
 # How many warps are refined: of the coarsest level; of those as many as have one number of segments; and from
 # level to level as many as have these frames together, so that long sequences take no longer than others.
-_CARRIED, _OF_EACH_COUNT, _FRAMES_CARRIED = 20, 4, 1600
+_CARRIED, _OF_EACH_COUNT, _FRAMES_CARRIED = 14, 3, 1200
 # The best third are tried with segments a little shorter and longer too.
 _NEARBY = (-2, -1, 1, 2)
 # Frames by which nodes are first moved, on each level.

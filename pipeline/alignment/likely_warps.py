@@ -30,7 +30,7 @@ from motionary.pipeline.alignment.nodes import stretchable
 from motionary.pipeline.config import Spacing
 from motionary.pipeline.motion import FloatArray
 
-_PRICES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of alpha
+_PRICES = (-1.0, 0.0, 1.0)  # of alpha
 _TIE = 1e-12
 
 
