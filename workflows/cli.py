@@ -370,7 +370,12 @@ def _run(
     job = Job([str(one) for one in libraries], catalog, config, labels, workers or CPU_COUNT, scheduler)
     log = _stderr()
     try:
-        result = run(job, partial(progress, console=log), partial(log.print, _COMPILING, highlight=False))
+        result = run(
+            job,
+            partial(progress, console=log),
+            partial(log.print, _COMPILING, highlight=False),
+            lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
+        )
     except KeyboardInterrupt:
         _fail("interrupted; the published catalog is as it was, and the same command resumes")
     _explain(result, labels is not None, log)

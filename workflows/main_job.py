@@ -27,6 +27,7 @@ from motionary.catalog.snapshot import (
 )
 from motionary.catalog.store import Store
 from motionary.catalog.views.overview import overview_page
+from motionary.catalog.writer_lock import Writer, the_only_writer
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import Task, TaskReport, build_graph
 from motionary.pipeline.readers.library import Source, scan_library
@@ -86,7 +87,12 @@ class RunResult:
 ShowProgress = Callable[[Counter], AbstractContextManager[Callable[[str], None]]]
 
 
-def run(job: Job, show_progress: ShowProgress, compiling: Callable[[], object] = lambda: None) -> RunResult:
+def run(
+    job: Job,
+    show_progress: ShowProgress,
+    compiling: Callable[[], object] = lambda: None,
+    take_over: Callable[[Writer], object] = lambda writer: None,
+) -> RunResult:
     """Ingest, compare, cluster, name and align a library, then publish the result in one step.
 
     Parameters
@@ -98,9 +104,13 @@ def run(job: Job, show_progress: ShowProgress, compiling: Callable[[], object] =
         task; see `motionary.workflows.progress`.
     compiling : callable
         Called if the kernels must be compiled first; that takes some twenty seconds, once on a machine.
+    take_over : callable
+        Told of a writer of this catalog that died.
 
     Raises
     ------
+    CatalogError
+        Another process writes this catalog.
     UserError
         The library is missing or holds no clip or too few, the labels file cannot be used, the catalog's
         folder holds something else, the scheduler cannot be reached, or compiled kernels cannot be kept.
@@ -116,13 +126,13 @@ def run(job: Job, show_progress: ShowProgress, compiling: Callable[[], object] =
 
     store = Store(absolute(job.catalog))
     _claim(store)
-    tasks = build_graph(sources, labels.table, job.config, store)
-    with show_progress(Counter(task.stage for task in tasks)) as done:
-        reports = compute(
-            tasks, job.workers, job.scheduler, done, None if _all_stored(store, tasks) else compiling
-        )
-
-    catalog = _publish(store, tasks, reports, job, roots, started)
+    with the_only_writer(store, take_over):
+        tasks = build_graph(sources, labels.table, job.config, store)
+        with show_progress(Counter(task.stage for task in tasks)) as done:
+            reports = compute(
+                tasks, job.workers, job.scheduler, done, None if _all_stored(store, tasks) else compiling
+            )
+        catalog = _publish(store, tasks, reports, job, roots, started)
     computed = sum(report.computed for report in reports)
     return RunResult(catalog, labels.outside, computed, len(reports) - computed)
 
