@@ -141,6 +141,8 @@ class Catalog:
     def sql(self, query: str, parameters: Sequence[object] | Mapping[str, object] | None = None) -> pa.Table:
         """Ask a question in DuckDB's SQL; every table of the catalog is a view of its name.
 
+        A query can read the catalog and nothing else: no other file, no address, no setting.
+
         Parameters
         ----------
         query : str
@@ -244,6 +246,11 @@ class Catalog:
         for name, files in self.snapshot.tables.items():
             listed = ", ".join(_sql_text(self.store.full_path(file)) for file in files)
             connection.execute(f'create view "{name}" as from read_parquet([{listed}], union_by_name = true)')
+        # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.
+        home = _sql_text(self.store.full_path("").rstrip("/") + "/")
+        connection.execute(f"set allowed_directories = [{home}]")
+        connection.execute("set enable_external_access = false")
+        connection.execute("set lock_configuration = true")
 
     def _clip(self, clip_id: str) -> dict:
         table = self.clips.to_arrow()

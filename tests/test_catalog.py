@@ -165,3 +165,28 @@ def test_an_unknown_clip_is_told_the_nearest(demo_catalog):
     clip_id = Catalog.open(demo_catalog).clips.to_arrow()["clip_id"][0].as_py()
     with pytest.raises(CatalogError, match=f"no clip .*did you mean .*{clip_id}"):
         Catalog.open(demo_catalog).motion(clip_id.replace(".bvh", ".bhv"))
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "select * from read_csv('{outside}')",
+        "select * from read_text('{outside}')",
+        "select * from glob('{folder}/*')",
+        "select * from '{outside}'",
+        "select * from read_parquet('{catalog}/../*/*.parquet')",
+        "select * from read_csv('https://localhost:9/x.csv')",
+        "copy (select 1) to '{folder}/made.csv'",
+        "attach '{folder}/made.db'",
+        "set enable_external_access = true",
+        "install httpfs",
+    ],
+)
+def test_a_query_reaches_nothing_but_the_catalog(demo_catalog, tmp_path, query):
+    outside = tmp_path / "secret.csv"
+    outside.write_text("secret\n1\n")
+    catalog = Catalog.open(demo_catalog)
+    with pytest.raises(CatalogError):
+        catalog.sql(query.format(outside=outside, folder=tmp_path, catalog=demo_catalog))
+    assert [path.name for path in tmp_path.iterdir()] == ["secret.csv"]
+    assert len(catalog.sql("select * from clips")) == len(catalog.clips)
