@@ -58,7 +58,7 @@ def compile_kernels(announce: Callable[[], object]) -> None:
     Parameters
     ----------
     announce : callable
-        Called before a compilation, which takes some twenty seconds.
+        Called before a compilation, which takes some thirty seconds.
 
     Raises
     ------

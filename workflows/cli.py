@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 FAILED, QUARANTINED = 1, 3
 
-_COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some twenty seconds"
+_COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
 
 app = typer.Typer(
     name="motionary",

@@ -66,11 +66,10 @@ def fill_tables(
     """Fill the tables of all segments, one after another: see `correlation_tables.TableLayout`."""
     frames = len(source)
     for k in range(len(nodes) - 1):
-        places = high[k] - low[k] + 1
         _segment_table(
             source[nodes[k] : nodes[k + 1] + 1], reference, frames, weights, source_floor, reference_floor,
             inverse, least, (least_eta[k], most_eta[k]), (low[k], high[k]), (low[k + 1], high[k + 1]),
-            values[start[k] : start[k + 1]].reshape((most_eta[k] - least_eta[k] + 1, places)),
+            values[start[k] : start[k + 1]],
         )  # fmt: skip
 
 
@@ -125,10 +124,10 @@ def _segment_table(
     etas, first, following : tuple of int
         Least and greatest eta, and output frames of the segment's two nodes. Where a segment hangs over the
         reference's ends, what lies within is compared.
-    table : array (etas, places)
+    table : array (etas * places,)
         Zeros; cells whose second node lies outside `following` stay so and are never read.
     """
-    span, dofs = len(segment) - 1, segment.shape[1]
+    span, dofs, places = len(segment) - 1, segment.shape[1], first[1] - first[0] + 1
     stretched = np.empty((span + etas[1] + 1, dofs))
     sums, scale = np.empty((PLACES, dofs)), np.empty(dofs)
     for eta in range(etas[0], etas[1] + 1):
@@ -136,7 +135,7 @@ def _segment_table(
         low, high = max(first[0], following[0] - out), min(first[1], following[1] - out)
         if low > high:
             continue
-        row = table[eta - etas[0]]
+        row = table[(eta - etas[0]) * places : (eta - etas[0] + 1) * places]
         _stretch(segment, stretched[: out + 1])
         inside_low, inside_high = max(low, 0), min(high, frames - 1 - out)
         for place in range(low, high + 1):
@@ -144,7 +143,9 @@ def _segment_table(
                 row[place - first[0]] = _correlated(
                     stretched[: out + 1], reference, frames, weights, segment_floor, reference_floor, place
                 )
-        _centre(stretched[: out + 1], weights, segment_floor, scale)
+        _centre(stretched[: out + 1], segment_floor, scale)
+        for dof in range(dofs):
+            scale[dof] *= weights[dof]
         for start in range(inside_low, inside_high + 1, PLACES):
             _products(stretched[: out + 1], reference[start:], sums)
             for k in range(min(PLACES, inside_high + 1 - start)):
@@ -164,8 +165,8 @@ def _stretch(segment: FloatArray, stretched: FloatArray) -> None:
 
 
 @_kernel
-def _centre(pattern: FloatArray, weights: FloatArray, floor: FloatArray, scale: FloatArray) -> None:
-    """Subtract the means; fill `scale` with weight / norm, 0 where the pattern counts as constant."""
+def _centre(pattern: FloatArray, floor: FloatArray, scale: FloatArray) -> None:
+    """Subtract the means; fill `scale` with 1 / norm, 0 where the pattern counts as constant."""
     frames, dofs = pattern.shape
     mean, squares = np.zeros(dofs), np.zeros(dofs)
     for j in range(frames):
@@ -179,7 +180,7 @@ def _centre(pattern: FloatArray, weights: FloatArray, floor: FloatArray, scale: 
             squares[dof] += pattern[j, dof] * pattern[j, dof]
     for dof in range(dofs):
         constant = squares[dof] <= floor[dof] * frames
-        scale[dof] = 0.0 if constant else weights[dof] / np.sqrt(squares[dof])
+        scale[dof] = 0.0 if constant else 1.0 / np.sqrt(squares[dof])
 
 
 @_kernel
@@ -195,11 +196,16 @@ def _correlated(
     """Correlate what lies within the reference of a segment that may begin before it or end after it."""
     dofs = len(weights)
     begin, end = max(place, 0), min(place + len(stretched), frames)
-    pattern, window = stretched[begin - place : end - place].copy(), reference[begin:end].copy()
-    scale, window_scale = np.empty(dofs), np.empty(dofs)
-    _centre(pattern, weights, segment_floor, scale)
-    _centre(window, np.ones(dofs), reference_floor, window_scale)
-    sums = np.zeros(dofs)
+    pattern, window = np.empty((end - begin, dofs)), np.empty((end - begin, dofs))
+    for j in range(end - begin):
+        for dof in range(dofs):
+            pattern[j, dof] = stretched[begin - place + j, dof]
+            window[j, dof] = reference[begin + j, dof]
+    scale, window_scale, sums = np.empty(dofs), np.empty(dofs), np.zeros(dofs)
+    _centre(pattern, segment_floor, scale)
+    _centre(window, reference_floor, window_scale)
+    for dof in range(dofs):
+        scale[dof] *= weights[dof]
     for j in range(end - begin):
         for dof in range(dofs):
             sums[dof] += pattern[j, dof] * window[j, dof]

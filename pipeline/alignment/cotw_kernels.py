@@ -83,15 +83,16 @@ def best_path(
     moved : array (c + 1,)
         Filled with each node's output frame.
     """
-    spans = nodes[1:] - nodes[:-1]
-    segments, widest = len(spans), (high - low).max() + 1
+    segments, widest = len(nodes) - 1, 0
+    for k in range(segments + 1):
+        widest = max(widest, high[k] - low[k] + 1)
     choices = np.zeros((segments, widest), dtype=np.int64)
     best, following = np.zeros(widest), np.zeros(widest)
     for k in range(segments - 1, -1, -1):
-        following[:] = best
+        best, following, span = following, best, nodes[k + 1] - nodes[k]
         for place in range(low[k], high[k] + 1):
-            least = max(-slacks[k], least_eta[k], low[k + 1] - place - spans[k])
-            most = min(slacks[k], most_eta[k], high[k + 1] - place - spans[k])
+            least = max(-slacks[k], least_eta[k], low[k + 1] - place - span)
+            most = min(slacks[k], most_eta[k], high[k + 1] - place - span)
             greatest, choice = -np.inf, 0
             for turn in range(2 * max(-least, most) + 1):
                 # 0, -1, 1, -2, 2, ...: the first of equals is the least stretch
@@ -99,7 +100,7 @@ def best_path(
                 if eta < least or eta > most:
                     continue
                 cell = start[k] + (eta - least_eta[k]) * places[k] + place - first[k]
-                value = values[cell] + following[place + spans[k] + eta - low[k + 1]]
+                value = values[cell] + following[place + span + eta - low[k + 1]]
                 if value > greatest + tie or greatest == -np.inf:
                     greatest, choice = value, eta
             best[place - low[k]] = greatest
@@ -110,4 +111,4 @@ def best_path(
         if best[place - low[0]] > best[moved[0] - low[0]] + tie:
             moved[0] = place
     for k in range(segments):
-        moved[k + 1] = moved[k] + spans[k] + choices[k, moved[k] - low[k]]
+        moved[k + 1] = moved[k] + nodes[k + 1] - nodes[k] + choices[k, moved[k] - low[k]]

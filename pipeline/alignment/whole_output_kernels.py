@@ -52,9 +52,9 @@ def climb(
     slopes: FloatArray,
 ) -> float:
     """Move inner nodes, one or two neighbours at a time, while that raises rho - alpha |h|."""
-    spans = nodes[1:] - nodes[:-1]
-    sums = np.zeros((len(spans), 4, source.shape[1]))
-    for k in range(len(spans)):
+    segments = len(nodes) - 1
+    sums = np.zeros((segments, 4, source.shape[1]))
+    for k in range(segments):
         _sum_segment(nodes, moved, k, source, target, sums[k])
     rho, h = _judged(sums, len(source), shares, source_floor, inverse_target, slopes)
     best = rho - alpha * h
@@ -64,27 +64,42 @@ def climb(
         while better:
             better = False
             for wide in range(2):
-                for k in range(1, len(spans) - wide):
+                for k in range(1, segments - wide):
                     last = k + wide
                     for side in (-step, step):
                         if moved[k] + side < low[k] or moved[last] + side > high[last]:
                             continue
-                        before = moved[k] + side - moved[k - 1] - spans[k - 1]
-                        after = moved[last + 1] - moved[last] - side - spans[last]
+                        before = moved[k] + side - moved[k - 1] - nodes[k] + nodes[k - 1]
+                        after = moved[last + 1] - moved[last] - side - nodes[last + 1] + nodes[last]
                         if abs(before) > slacks[k - 1] or abs(after) > slacks[last]:
                             continue
-                        moved[k : last + 1] += side
+                        _shift(moved, k, last, side)
                         for one in range(k - 1, last + 1):
-                            kept[one - k + 1] = sums[one]
+                            _copy(sums[one], kept[one - k + 1])
                             _sum_segment(nodes, moved, one, source, target, sums[one])
                         rho, h = _judged(sums, len(source), shares, source_floor, inverse_target, slopes)
                         if rho - alpha * h > best + 1e-12:
                             best, better = rho - alpha * h, True
                         else:
-                            moved[k : last + 1] -= side
-                            sums[k - 1 : last + 1] = kept[: last - k + 2]
+                            _shift(moved, k, last, -side)
+                            for one in range(k - 1, last + 1):
+                                _copy(kept[one - k + 1], sums[one])
         step //= 2
     return best
+
+
+@_kernel
+def _shift(moved: Integers, first: int, last: int, frames: int) -> None:
+    for k in range(first, last + 1):
+        moved[k] += frames
+
+
+@_kernel
+def _copy(values: FloatArray, to: FloatArray) -> None:
+    """Copy cell by cell: an assignment of slices takes seconds to compile, for the texts of its errors."""
+    for row in range(values.shape[0]):
+        for column in range(values.shape[1]):
+            to[row, column] = values[row, column]
 
 
 @_kernel
