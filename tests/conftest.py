@@ -1,5 +1,6 @@
 """Fixtures that more than one test module uses."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.synthetic import write_library
+from motionary.workflows import cli
 from motionary.workflows.main_job import Job, run
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -47,3 +49,17 @@ def silent(totals: object) -> Iterator[Callable[[str], None]]:
 def silent_progress() -> Callable:
     """Return a way of showing progress that shows none."""
     return silent
+
+
+@pytest.fixture
+def motionary(monkeypatch, capfdbinary):
+    """Run a command in this process; returns exit code, stdout and stderr."""
+
+    def call(*arguments: object, binary: bool = False):
+        monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        out, err = capfdbinary.readouterr()
+        return stop.value.code, out if binary else out.decode(), err.decode()
+
+    return call

@@ -9,22 +9,6 @@ import sys
 import pyarrow.parquet as pq
 import pytest
 
-from motionary.workflows import cli
-
-
-@pytest.fixture
-def motionary(monkeypatch, capfdbinary):
-    """Run a command in this process; returns exit code, stdout and stderr."""
-
-    def call(*arguments: object, binary: bool = False):
-        monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        out, err = capfdbinary.readouterr()
-        return stop.value.code, out if binary else out.decode(), err.decode()
-
-    return call
-
 
 def test_help_answers_without_the_numerical_stack():
     script = (

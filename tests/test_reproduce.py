@@ -2,7 +2,7 @@
 
 import io
 import json
-import sys
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +16,6 @@ from motionary.catalog import Catalog
 from motionary.pipeline.clustering import average_linkage, complete_linkage, cut_tree, ward_linkage
 from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.features import motion_features
-from motionary.workflows import cli
 from motionary.workflows.errors import UserError
 from motionary.workflows.reproduce import dtw_curve
 from motionary.workflows.reproduce.better import (
@@ -40,17 +39,9 @@ CLASSES = np.array(["a"] * 25 + ["b"] * 8 + ["c"] * 6 + ["d"] * 3)
 
 
 @pytest.fixture
-def motionary(monkeypatch, capfdbinary):
-    """Run a command in this process; returns exit code, stdout and stderr."""
-
-    def call(*arguments: object):
-        monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        out, err = capfdbinary.readouterr()
-        return stop.value.code, out, err.decode()
-
-    return call
+def motionary(motionary):
+    """Run a command and read what it prints as bytes."""
+    return partial(motionary, binary=True)
 
 
 def sizes(rule: str, number: int, classes: np.ndarray = BIG, seed: int = 0) -> list[int]:

@@ -1,7 +1,6 @@
 """`motionary export` and `motionary transfer`: what they print, where, and with which exit code."""
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,21 +9,7 @@ import pytest
 from motionary.catalog import Catalog
 from motionary.pipeline.readers import read_motion
 from motionary.pipeline.style import fastest_joint, foot_sliding, transfer
-from motionary.workflows import cli
 from motionary.workflows.transfer import StyleTransfer
-
-
-@pytest.fixture
-def motionary(monkeypatch, capfd):
-    """Run a command in this process; returns exit code, stdout and stderr."""
-
-    def call(*arguments: object):
-        monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, *capfd.readouterr()
-
-    return call
 
 
 @pytest.fixture(scope="module")

@@ -89,8 +89,7 @@ def likely_warps(
 def _agreement(pair: MatchedPair) -> FloatArray:
     """Return A (m, m): input frame, reference frame."""
     target = pair.target[: pair.frames]
-    moves = (pair.source**2).mean(axis=0) > pair.source_floor
-    moves &= (target**2).mean(axis=0) > pair.target_floor
+    moves = pair.source_varies & pair.target_varies
     norms = np.sqrt((pair.source**2).sum(axis=0) * (target**2).sum(axis=0))
     scale = np.divide(pair.weights, norms, out=np.zeros(len(norms)), where=moves) / pair.total_weight
     # Not a product by BLAS, whose threads would meet those of a run.
@@ -101,6 +100,5 @@ def _steepness(pair: MatchedPair) -> NDArray[np.float64]:
     """Return the sum of e over the input's frames up to each (m,)."""
     squares = np.diff(pair.source, axis=0) ** 2
     total = squares.sum(axis=0)
-    moves = (pair.source**2).mean(axis=0) > pair.source_floor
-    shares = np.divide(pair.weights, total, out=np.zeros(len(total)), where=moves & (total > 0))
+    shares = np.divide(pair.weights, total, out=np.zeros(len(total)), where=pair.source_varies & (total > 0))
     return np.append(0.0, np.cumsum(squares @ shares)) / (2 * pair.total_weight)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.rounding import rounding_level
 from motionary.pipeline.alignment.uniform import uniform_times
-from motionary.pipeline.alignment.warp import checked_sequence, interpolate
+from motionary.pipeline.alignment.warp import checked_pair, interpolate
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -45,6 +47,16 @@ class MatchedPair:
     frames: int
     moving_frames: int
 
+    @cached_property
+    def source_varies(self) -> NDArray[np.bool_]:
+        """Which DOFs of the moving sequence are not constant (dofs,)."""
+        return (self.source**2).mean(axis=0) > self.source_floor
+
+    @cached_property
+    def target_varies(self) -> NDArray[np.bool_]:
+        """Which DOFs of the reference are not constant (dofs,)."""
+        return (self.target[: self.frames] ** 2).mean(axis=0) > self.target_floor
+
     def at_length(self, frames: int) -> MatchedPair:
         """Return the same pair at another number of frames, both sequences sampled evenly."""
         times = uniform_times(self.frames, frames)
@@ -60,11 +72,7 @@ def matched_pair(moving: FloatArray, reference: FloatArray, weights: FloatArray 
     ValueError
         Shapes disagree, or a value or a weight is not finite or a weight negative.
     """
-    moving, reference = checked_sequence(moving, "moving"), checked_sequence(reference, "reference")
-    if moving.shape[1] != reference.shape[1]:
-        raise ValueError(
-            f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
-        )
+    moving, reference = checked_pair(moving, reference)
     weights = checked_weights(weights, reference.shape[1])
     kept = np.flatnonzero(weights)
     matched = interpolate(moving[:, kept].astype(np.float64), uniform_times(len(moving), len(reference)))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.alignment.warp import Warp, checked_sequence
+from motionary.pipeline.alignment.warp import Warp, checked_pair
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -62,11 +62,7 @@ def dtw(moving: FloatArray, reference: FloatArray, weights: FloatArray | None = 
     """
     from motionary.pipeline.distances import cost_matrix, dtw_path
 
-    moving, reference = checked_sequence(moving, "moving"), checked_sequence(reference, "reference")
-    if moving.shape[1] != reference.shape[1]:
-        raise ValueError(
-            f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
-        )
+    moving, reference = checked_pair(moving, reference)
     if weights is not None:
         scale = np.sqrt(checked_weights(weights, reference.shape[1]))
         moving, reference = moving * scale, reference * scale

@@ -21,7 +21,7 @@ from scipy.spatial.distance import cdist
 
 from motionary.pipeline.alignment.rounding import rounding_level
 from motionary.pipeline.alignment.uniform import uniform_times
-from motionary.pipeline.alignment.warp import checked_sequence, interpolate
+from motionary.pipeline.alignment.warp import checked_sequence, checked_stack, interpolate
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -66,16 +66,7 @@ def similarity_index(clips: FloatArray, weights: FloatArray | None = None) -> Fl
     ValueError
         Shapes disagree or a value is not finite.
     """
-    clips = np.asarray(clips)
-    if clips.ndim != 3 or not clips.size:
-        raise ValueError(
-            f"clips have shape {clips.shape}; it needs (clips, frames, dofs), at least one of each"
-        )
-    if not np.isfinite(clips).all():
-        clip, frame, dof = np.argwhere(~np.isfinite(clips))[0]
-        raise ValueError(
-            f"clip {clip} holds {clips[clip, frame, dof]} at frame {frame}, DOF {dof}; values must be finite"
-        )
+    clips = checked_stack(clips)
     weights = checked_weights(weights, clips.shape[2])
     levels = np.array([rounding_level(clip) for clip in clips])
     total = np.full(len(clips), -np.inf)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionary.pipeline.alignment.rounding import rounding_level
+from motionary.pipeline.alignment.warp import checked_stack
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -33,16 +34,7 @@ def computed_trajectories(clips: FloatArray) -> dict[str, FloatArray]:
     ValueError
         `clips` is not (clips, frames, dofs), is empty, or holds a value that is not finite.
     """
-    clips = np.asarray(clips)
-    if clips.ndim != 3 or not clips.size:
-        raise ValueError(
-            f"clips have shape {clips.shape}; it needs (clips, frames, dofs), at least one of each"
-        )
-    if not np.isfinite(clips).all():
-        clip, frame, dof = np.argwhere(~np.isfinite(clips))[0]
-        raise ValueError(
-            f"clip {clip} holds {clips[clip, frame, dof]} at frame {frame}, DOF {dof}; values must be finite"
-        )
+    clips = checked_stack(clips)
     return {
         "mean": clips.mean(axis=0),
         "median": np.median(clips, axis=0),

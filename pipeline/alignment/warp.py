@@ -151,6 +151,43 @@ def interpolate(values: FloatArray, times: FloatArray) -> FloatArray:
     return sampled.astype(values.dtype) if np.issubdtype(values.dtype, np.floating) else sampled
 
 
+def checked_pair(moving: FloatArray, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a moving sequence and its reference as arrays, after checking that they can be compared.
+
+    Raises
+    ------
+    ValueError
+        As `checked_sequence`, or they have other numbers of DOFs.
+    """
+    moving, reference = checked_sequence(moving, "moving"), checked_sequence(reference, "reference")
+    if moving.shape[1] != reference.shape[1]:
+        raise ValueError(
+            f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
+        )
+    return moving, reference
+
+
+def checked_stack(clips: FloatArray) -> FloatArray:
+    """Return length-matched sequences as an array (clips, frames, dofs), after checking that they are such.
+
+    Raises
+    ------
+    ValueError
+        They have other than three axes, none is there, or a value is not finite.
+    """
+    clips = np.asarray(clips)
+    if clips.ndim != 3 or not clips.size:
+        raise ValueError(
+            f"clips have shape {clips.shape}; it needs (clips, frames, dofs), at least one of each"
+        )
+    if not np.isfinite(clips).all():
+        clip, frame, dof = np.argwhere(~np.isfinite(clips))[0]
+        raise ValueError(
+            f"clip {clip} holds {clips[clip, frame, dof]} at frame {frame}, DOF {dof}; values must be finite"
+        )
+    return clips
+
+
 def checked_sequence(values: FloatArray, name: str) -> FloatArray:
     """Return a sequence as an array (frames, dofs), after checking that it is one.
 

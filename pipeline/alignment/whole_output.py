@@ -37,12 +37,9 @@ class WholeOutput:
     def __init__(self, pair: MatchedPair) -> None:
         if not pair.total_weight > 0:
             raise ValueError("all weights are 0; the mean correlation needs one that is not")
-        target = pair.target[: pair.frames]
-        norms = np.linalg.norm(target, axis=0)
-        moves = norms > np.sqrt(pair.target_floor * pair.frames)
-        inverse_target = np.divide(1.0, norms, out=np.zeros_like(norms), where=moves)
-        varies = (pair.source**2).mean(axis=0) > pair.source_floor
-        slopes = np.where(varies, np.linalg.norm(np.diff(pair.source, axis=0), axis=0), 0.0)
+        norms = np.linalg.norm(pair.target[: pair.frames], axis=0)
+        inverse_target = np.divide(1.0, norms, out=np.zeros_like(norms), where=pair.target_varies)
+        slopes = np.where(pair.source_varies, np.linalg.norm(np.diff(pair.source, axis=0), axis=0), 0.0)
 
         self._arguments = (
             pair.source, pair.target, pair.weights / pair.total_weight, pair.source_floor,

@@ -135,19 +135,20 @@ def _takes(seed: int, takes: int) -> Iterator[SyntheticTake]:
                 plain = style == NEUTRAL and number == 1
                 rng = np.random.default_rng([seed, a, s, number])
                 # Remainders by 2, 3 and 5 mix skeletons, rates, hands and bodies evenly, whatever the seed.
-                yield _take(
+                yield perform_take(
                     action,
                     style if plain else personal(style, rng),
                     DEFAULT_BODY if plain else bodies[(a + 2 * s + number) % len(bodies)],
                     conventions[(a + s + number) % len(conventions)],
                     fps=60.0 if (a + s + number) % 3 == 0 else 30.0,
                     is_mirrored=not plain and (2 * a + 2 * s + number) % 5 == 4,
+                    start=rng.uniform(0.0, 1.0 - action.taken / action.cycles),
                     number=number,
                     rng=rng,
                 )
 
 
-def _take(
+def perform_take(
     action: Action,
     style: Style,
     body: Body,
@@ -155,11 +156,12 @@ def _take(
     *,
     fps: float,
     is_mirrored: bool,
+    start: float,
     number: int,
     rng: np.random.Generator,
 ) -> SyntheticTake:
+    """Perform an action once, from a share `start` of its template on; timing and place are drawn."""
     share = action.taken / action.cycles
-    start = rng.uniform(0.0, 1.0 - share)
     frames = round(action.seconds * share * style.pace * fps) + 1
     time = start + share * random_warp(np.linspace(0.0, 1.0, frames), rng)
     posture = _perform(action, time, style, body)

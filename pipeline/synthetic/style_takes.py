@@ -11,17 +11,16 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from motionary.pipeline.synthetic.actions import ACTIONS, Action
-from motionary.pipeline.synthetic.bodies import BODIES, Body
+from motionary.pipeline.synthetic.actions import ACTIONS
+from motionary.pipeline.synthetic.bodies import BODIES
 from motionary.pipeline.synthetic.conventions import MIXAMO
 from motionary.pipeline.synthetic.library import (
     TEMPLATE_FPS,
     SyntheticTake,
-    random_warp,
+    perform_take,
     template_frames,
 )
-from motionary.pipeline.synthetic.posture import placed, pose
-from motionary.pipeline.synthetic.styles import STYLES, Style, apply, personal
+from motionary.pipeline.synthetic.styles import STYLES, Style, personal
 
 
 def style_takes(action: str, seed: int = 0, takes: int = 10, strength: float = 1.0) -> list[SyntheticTake]:
@@ -55,41 +54,29 @@ def style_takes(action: str, seed: int = 0, takes: int = 10, strength: float = 1
     if not 0 <= strength <= 1:
         raise ValueError(f"strength is {strength}; it must lie in 0 .. 1")
     bodies = tuple(BODIES.values())
-    return [
-        _take(
-            ACTIONS[action],
-            _weakened(style, strength),
-            bodies[number % len(bodies)],
-            number,
-            np.random.default_rng([seed, list(ACTIONS).index(action), place, number]),
-        )
-        for place, style in enumerate(STYLES.values())
-        for number in range(1, takes + 1)
-    ]
+    performed = []
+    for place, style in enumerate(STYLES.values()):
+        shown = _weakened(style, strength)
+        for number in range(1, takes + 1):
+            rng = np.random.default_rng([seed, list(ACTIONS).index(action), place, number])
+            performed.append(
+                perform_take(
+                    ACTIONS[action],
+                    personal(shown, rng),
+                    bodies[number % len(bodies)],
+                    MIXAMO,
+                    fps=TEMPLATE_FPS,
+                    is_mirrored=False,
+                    start=0.0,
+                    number=number,
+                    rng=rng,
+                )
+            )
+    return performed
 
 
 def _weakened(style: Style, strength: float) -> Style:
     changes = {one.name: one.default for one in fields(style) if one.name != "name"}
     return replace(
         style, **{name: plain + strength * (getattr(style, name) - plain) for name, plain in changes.items()}
-    )
-
-
-def _take(action: Action, style: Style, body: Body, number: int, rng: np.random.Generator) -> SyntheticTake:
-    shown = personal(style, rng)
-    share = action.taken / action.cycles
-    frames = round(action.seconds * share * shown.pace * TEMPLATE_FPS) + 1
-    time = share * random_warp(np.linspace(0.0, 1.0, frames), rng)
-    posture = pose(apply(shown, action.curves(time, shown)), body)
-    heading, place = rng.uniform(-np.pi, np.pi), (rng.uniform(-2, 2), rng.uniform(-2, 2))
-    name = f"{action.name}_{style.name}_{body.name}_{number:02d}"
-    return SyntheticTake(
-        motion=MIXAMO.motion(placed(posture, heading, place), body, TEMPLATE_FPS, name),
-        action=action.name,
-        style=style.name,
-        subject=body.name,
-        take=number,
-        convention=MIXAMO.name,
-        is_mirrored=False,
-        warp=time * (template_frames(action.name) - 1),
     )

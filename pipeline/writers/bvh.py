@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
-from uuid import uuid4
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.motion import FloatArray, Motion
+from motionary.pipeline.writers.whole import whole_file
 
 DECIMALS = 6
 _AT_THE_POLE = 1e-7  # cosine of the middle angle under which the outer two turn about one axis
@@ -49,7 +48,8 @@ def write_bvh(motion: Motion, path: str | os.PathLike[str], *, rotation_order: s
     i, j, k = ("XYZ".index(axis) for axis in rotation_order.upper())
     names = _plain_names(motion.skeleton.names)
     lines = [*_hierarchy(motion, names, rotation_order.upper()), *_frames(motion, (i, j, k))]
-    _replace(Path(path), "\n".join(lines) + "\n")
+    with whole_file(path) as file:
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
 def euler_angles(quaternions: FloatArray, order: tuple[int, int, int]) -> FloatArray:
@@ -158,13 +158,3 @@ def _file_order(parents: tuple[int, ...]) -> list[int]:
 
 def _numbers(values: FloatArray) -> str:
     return " ".join(f"{value:.{DECIMALS}f}" for value in np.round(values, DECIMALS) + 0.0)
-
-
-def _replace(path: Path, text: str) -> None:
-    # A name of its own for each writer, in the same folder: os.replace is atomic only within a file system.
-    temporary = path.with_name(f".{path.name}.{uuid4().hex}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
