@@ -1,0 +1,47 @@
+"""What several commands share: options, exit codes, where answers and remarks go."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from motionary.catalog import Catalog
+
+FAILED, QUARANTINED, UNVERIFIED = 1, 3, 4
+"""Exit codes beside 0, done, and 2, usage: failed; done with quarantined clips; verification failed."""
+
+CatalogUrl = Annotated[
+    str, typer.Argument(metavar="CATALOG", help="Folder of the catalog, or its fsspec URL.")
+]
+OutputFormat = Annotated[
+    Literal["table", "json", "csv", "parquet"], typer.Option("--format", help="How to write the answer.")
+]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes on this machine.", show_default="one a core")
+]
+Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
+
+
+def open_catalog(url: str) -> Catalog:
+    """Open a catalog's published snapshot."""
+    from motionary.catalog import Catalog
+
+    return Catalog.open(url)
+
+
+def stderr_console() -> Console:
+    """Return where remarks and progress go, so that stdout holds the answer only."""
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+def fail(message: str) -> NoReturn:
+    """Say on stderr what went wrong, and exit."""
+    print(f"motionary: {message}", file=sys.stderr)
+    sys.exit(FAILED)

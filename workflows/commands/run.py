@@ -1,0 +1,185 @@
+"""Commands that run the main job, or draw its graph."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from motionary.workflows.commands.options import (
+    QUARANTINED,
+    CatalogUrl,
+    Scheduler,
+    Workers,
+    fail,
+    stderr_console,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from motionary.pipeline.config import PipelineConfig
+    from motionary.workflows.main_job import RunResult
+
+_COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
+
+
+def run(
+    library: Annotated[Path, typer.Argument(metavar="LIBRARY", help="Folder of motion capture.")],
+    catalog: CatalogUrl,
+    also: Annotated[
+        list[Path] | None, typer.Option("--also", help="A further library; repeat for more.")
+    ] = None,
+    labels: Annotated[
+        Path | None, typer.Option("--labels", help="CSV of labels: path or clip_id, and any label columns.")
+    ] = None,
+    label_column: Annotated[
+        str | None,
+        typer.Option("--label-column", help="Column that clusters are named by.", show_default="action"),
+    ] = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="The paper's settings: its pose, complete linkage, widest strip.")
+    ] = False,
+    primary: Annotated[
+        Literal["ward", "complete", "average", "fuzzy"] | None,
+        typer.Option("--primary", help="Linkage whose clusters are published.", show_default="ward"),
+    ] = None,
+    metric: Annotated[
+        Literal["weighted", "dtw", "b_dtw"] | None,
+        typer.Option("--metric", help="Distance that linkage works on.", show_default="weighted"),
+    ] = None,
+    clusters: Annotated[
+        int | None, typer.Option("--clusters", "--kappa", min=1, help="Exactly this many clusters.")
+    ] = None,
+    threshold: Annotated[
+        float | None, typer.Option("--threshold", "--mu", min=0, help="Cut the dendrogram at this height.")
+    ] = None,
+    weights: Annotated[
+        Literal["full", "legs", "arms"] | None,
+        typer.Option("--weights", help="Part of the body that alignment attends to.", show_default="full"),
+    ] = None,
+    full_grid: Annotated[
+        bool,
+        typer.Option(
+            "--full-grid",
+            help="Search every segment length and slack for references over 96 frames too: slower.",
+        ),
+    ] = False,
+    travel: Annotated[
+        bool,
+        typer.Option("--travel/--no-travel", help="Whether the direction of travel tells motions apart."),
+    ] = True,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings of every stage, TOML.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Cluster, name and align the motions of LIBRARY into CATALOG."""
+    from motionary.workflows.settings import PAPER, load_settings
+
+    if clusters is not None and threshold is not None:
+        raise typer.BadParameter("give --clusters or --threshold, not both")
+    options: dict[str, dict[str, Any]] = {"clusters": {}, "features": {}}
+    if paper:
+        options = {stage: dict(fields) for stage, fields in PAPER.items()}
+    given = {
+        "primary": primary, "metric": metric, "n_clusters": clusters, "threshold": threshold,
+        "label_column": label_column,
+    }  # fmt: skip
+    options["clusters"] |= {name: value for name, value in given.items() if value is not None}
+    if not travel:
+        options["features"]["travel_time"] = 0.0
+    options["alignment"] = ({"weights": weights} if weights else {}) | (
+        {"search": "full"} if full_grid else {}
+    )
+    _run([library, *(also or [])], catalog, load_settings(config, options), labels, workers, scheduler)
+
+
+def demo(
+    folder: Annotated[Path, typer.Argument(help="Where the library and the catalog go.")] = Path(
+        "motionary-demo"
+    ),
+    seed: Annotated[int, typer.Option("--seed", help="Of the embedded library.")] = 0,
+    workers: Workers = None,
+) -> None:
+    """Run the main job on the embedded library of made-up motions and show the result."""
+    from motionary.pipeline.synthetic import write_library
+    from motionary.workflows.settings import load_settings
+
+    library, catalog = folder / "library", folder / "catalog"
+    log = stderr_console()
+    log.print(f"Writing the embedded library to {library}", highlight=False, soft_wrap=True)
+    write_library(library, seed=seed)
+    log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
+    _run([library], str(catalog), load_settings(None, {}), library / "labels.csv", workers, None)
+    print(f"\nNext:\n  open {catalog / 'overview.html'} in a browser")
+    print(f'  {_program()} query {catalog} "select label, count(*) as clips from clusters group by label"')
+    print(f"  {_program()} status {catalog}")
+
+
+def graph(
+    out: Annotated[Path, typer.Argument(help="A file ending in .svg or .txt.")],
+    library: Annotated[
+        Path | None,
+        typer.Option("--library", help="Show the graph of this library.", show_default="three clips"),
+    ] = None,
+) -> None:
+    """Draw the Dask graph of the main job."""
+    from motionary.workflows.graph_picture import draw_graph
+
+    draw_graph(out, library)
+    print(f"wrote {out}")
+
+
+def _run(
+    libraries: list[Path],
+    catalog: str,
+    config: PipelineConfig,
+    labels: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+) -> None:
+    from functools import partial
+
+    from dask.system import CPU_COUNT
+
+    from motionary.workflows.main_job import Job, run
+    from motionary.workflows.progress import progress
+    from motionary.workflows.summary import print_summary
+    from motionary.workflows.tables import output_console
+
+    job = Job([str(one) for one in libraries], catalog, config, labels, workers or CPU_COUNT, scheduler)
+    log = stderr_console()
+    try:
+        result = run(
+            job,
+            partial(progress, console=log),
+            partial(log.print, _COMPILING, highlight=False),
+            lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
+        )
+    except KeyboardInterrupt:
+        fail("interrupted; the published catalog is as it was, and the same command resumes")
+    _explain(result, labels is not None, log)
+    print_summary(result.catalog, output_console())
+    if len(result.catalog.quarantine):
+        raise typer.Exit(QUARANTINED)
+
+
+def _explain(result: RunResult, has_labels: bool, log: Console) -> None:
+    if result.labels_outside:
+        count, first = len(result.labels_outside), result.labels_outside[0]
+        log.print(f"passed over {count} labels of files outside the library ({first}, ...)", highlight=False)
+    if not has_labels:
+        log.print("clusters have no names without labels: --labels CSV", highlight=False)
+    if result.reused:
+        total = result.computed + result.reused
+        log.print(f"{result.reused} of {total} results were there already", highlight=False)
+
+
+def _program() -> str:
+    """Name this program so that the line can be typed again here."""
+    import shutil
+
+    return "motionary" if shutil.which("motionary") else os.path.relpath(sys.argv[0])
