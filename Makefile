@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The peers of the benchmarks: what they pin would drag down what we stand on.
 PEERS := .venv-peers
-SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed')
+SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml')
 
 .PHONY: help demo test test-all bench bench-alignment lint clean
 

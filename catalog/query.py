@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -13,8 +13,10 @@ import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 
 from motionary.catalog.errors import CatalogError
-from motionary.catalog.schema import SCHEMAS
-from motionary.catalog.snapshot import Snapshot, current_snapshot
+from motionary.catalog.leases import Lease
+from motionary.catalog.opening import open_snapshot
+from motionary.catalog.schema import PUBLISHED, SCHEMAS
+from motionary.catalog.snapshot import Snapshot, snapshot_ids
 from motionary.catalog.store import Store
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.stages.motions import read_motion_rows
@@ -34,6 +36,7 @@ class CatalogTable:
     name: str
     store: Store
     files: Sequence[str]
+    lease: Lease | None = field(default=None, repr=False, compare=False)
 
     def to_arrow(self) -> pa.Table:
         """Read the table with its units in the field metadata."""
@@ -64,18 +67,21 @@ class _Table:
             raise AttributeError(
                 f"{self.name} is a table of an opened catalog: Catalog.open(url).{self.name}"
             )
-        return CatalogTable(self.name, catalog.store, catalog.files(self.name))
+        return CatalogTable(self.name, catalog.store, catalog.files(self.name), catalog.lease)
 
 
 class Catalog:
     """A published catalog, opened for reading.
 
-    It keeps the snapshot it was opened at: a run that publishes meanwhile changes nothing it shows.
+    It keeps the snapshot it was opened at: a run that publishes meanwhile changes nothing it shows, and
+    vacuum leaves it alone until it is closed. One made directly, of a snapshot not yet published perhaps, is
+    not protected so.
 
     Examples
     --------
     >>> from motionary.catalog import Catalog
     >>> catalog = Catalog.open("takes.catalog")                                    # doctest: +SKIP
+    >>> earlier = Catalog.open("takes.catalog", snapshot=3)                        # doctest: +SKIP
     >>> catalog.sql("select label, count(*) from clusters group by label")         # doctest: +SKIP
     """
 
@@ -92,32 +98,53 @@ class Catalog:
     alignments = _Table()
     aligned_frames = _Table("aligned")
     styles = _Table()
+    lineage = _Table()
+    labels = _Table()
+    inputs = _Table()
     quarantine = _Table()
     runs = _Table()
 
-    def __init__(self, store: Store, snapshot: Snapshot) -> None:
+    def __init__(self, store: Store, snapshot: Snapshot, lease: Lease | None = None) -> None:
         self.store = store
         self.snapshot = snapshot
+        self.lease = lease
 
     @classmethod
-    def open(cls, url: str) -> Catalog:
-        """Open the published snapshot of a catalog.
+    def open(cls, url: str | os.PathLike[str], snapshot: int | str | None = None) -> Catalog:
+        """Open a catalog as it is, or as it was.
 
         Parameters
         ----------
-        url : str
+        url : str or path
             A folder, or any fsspec URL.
+        snapshot : int or str, optional
+            A snapshot's number, or the id of the run that published it, instead of the current one.
 
         Raises
         ------
         CatalogError
-            Nothing is published there.
+            Nothing is published there, or there is no such snapshot: it was never, or is vacuumed.
         """
         store = Store(str(url))
-        snapshot = current_snapshot(store)
-        if snapshot is None:
-            raise CatalogError(f"{url} is not a catalog; make one with: motionary run LIBRARY {url}")
-        return cls(store, snapshot)
+        return cls(store, *open_snapshot(store, snapshot))
+
+    def close(self) -> None:
+        """Give the snapshot up: vacuum may remove it."""
+        if self.lease is not None:
+            self.lease.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple:
+        return Catalog, (self.store, self.snapshot)  # a lease stays with the process that took it
+
+    def snapshots(self) -> list[str]:
+        """List the ids of the snapshots that are there, oldest first."""
+        return snapshot_ids(self.store)
 
     def __repr__(self) -> str:
         return f"<Catalog {self.store.url}: {len(self.clips)} clips, snapshot {self.snapshot.snapshot_id}>"
@@ -243,7 +270,10 @@ class Catalog:
         filesystem = self.store.filesystem
         if not isinstance(filesystem, LocalFileSystem):
             connection.register_filesystem(filesystem)
-        for name, files in self.snapshot.tables.items():
+        for name in PUBLISHED:
+            if name not in self.snapshot.tables:
+                continue  # an older motionary published it
+            files = self.snapshot.tables[name]
             listed = ", ".join(_sql_text(self.store.full_path(file)) for file in files)
             connection.execute(f'create view "{name}" as from read_parquet([{listed}], union_by_name = true)')
         # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.

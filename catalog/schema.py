@@ -11,8 +11,29 @@ from motionary.pipeline.tables import TABLES, table_field
 
 VERSION = 1
 
+_FILE = pa.struct(
+    [
+        pa.field("path", pa.string()),
+        pa.field("size", pa.int64()),
+        pa.field("mtime_ns", pa.int64()),
+        pa.field("ctime_ns", pa.int64()),
+        pa.field("inode", pa.int64()),
+    ]
+)
+
 SCHEMAS: dict[str, pa.Schema] = {
     **TABLES,
+    "inputs": pa.schema(
+        [
+            table_field("clip_id", pa.string(), "path of the clip in the library, with /"),
+            table_field("root", pa.string(), "folder of the library"),
+            table_field("path", pa.string(), "path in that folder"),
+            table_field("files", pa.list_(_FILE), "every file it is read from, as it was when it was read"),
+            table_field("digest", pa.string(), "BLAKE2b of their bytes; empty where they cannot be read"),
+            table_field("key", pa.string(), "digest of the bytes and of all that reading them depends on"),
+            table_field("batch", pa.int32(), "clips that are stored together, from 0"),
+        ]
+    ),
     "runs": pa.schema(
         [
             table_field("run_id", pa.string(), "start time and snapshot"),
@@ -24,6 +45,8 @@ SCHEMAS: dict[str, pa.Schema] = {
             table_field("clips", pa.int32(), "clips in the catalog"),
             table_field("quarantined", pa.int32(), "files that could not be read"),
             table_field("clusters", pa.int32(), "clusters published"),
+            table_field("clips_read", pa.int32(), "clips that were read"),
+            table_field("pairs_computed", pa.int64(), "pairs that were compared"),
             table_field(
                 "stage_seconds", pa.map_(pa.string(), pa.float64()), "work, summed over workers", "s"
             ),
@@ -31,8 +54,10 @@ SCHEMAS: dict[str, pa.Schema] = {
     ),
 }
 
-PUBLISHED = tuple(name for name in SCHEMAS if name not in ("ingested", "members", "reference_features"))
-"""The tables that a snapshot lists; the others pass from stage to stage."""
+_INTERNAL = ("ingested", "groups", "members", "represented", "centres", "reference_features")
+
+PUBLISHED = tuple(name for name in SCHEMAS if name not in _INTERNAL)
+"""The tables that a catalog shows; the others pass from stage to stage."""
 
 
 def conform(name: str, table: pa.Table) -> pa.Table:

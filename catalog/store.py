@@ -11,10 +11,13 @@ Every file appears under its final name whole or not at all.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import posixpath
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -24,7 +27,26 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 
+from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import conform
+
+
+@dataclass(frozen=True)
+class PartFacts:
+    """What a file is known by, so that a damaged or exchanged one is found out.
+
+    Parameters
+    ----------
+    rows : int
+    bytes : int
+        Its length.
+    blake2b : str
+        128-bit digest of its bytes, hexadecimal.
+    """
+
+    rows: int
+    bytes: int
+    blake2b: str
 
 
 @dataclass(frozen=True)
@@ -41,12 +63,26 @@ class Store:
 
     @property
     def filesystem(self) -> Any:
-        """The fsspec file system that the URL names."""
-        return fsspec.core.url_to_fs(self.url)[0]
+        """The fsspec file system that the URL names.
+
+        Raises
+        ------
+        CatalogError
+            What reaches it is not installed, or there is no such protocol.
+        """
+        return self._located()[0]
 
     def path(self, *names: str) -> str:
         """Join names to the catalog's folder, as a path of the file system."""
-        return posixpath.join(fsspec.core.url_to_fs(self.url)[1], *names)
+        return posixpath.join(self._located()[1], *names)
+
+    def _located(self) -> tuple[Any, str]:
+        try:
+            # Others write there too: a listing that was remembered would hide what they did.
+            return fsspec.core.url_to_fs(self.url, use_listings_cache=False)
+        except (ImportError, ValueError) as error:
+            hint = "; for s3:// install motionary[s3]" if self.url.startswith("s3") else ""
+            raise CatalogError(f"{self.url} cannot be reached: {error}{hint}") from None
 
     def full_path(self, name: str) -> str:
         """Name a file of the catalog so that other tools find it: with its protocol where it is not local."""
@@ -62,18 +98,40 @@ class Store:
         filesystem = self.filesystem
         return all(filesystem.exists(self.path(self.part_name(table, key))) for table in tables)
 
-    def save(self, key: str, tables: Mapping[str, pa.Table]) -> None:
-        """Write a result's parts, each with its table's schema.
+    def save(self, key: str, tables: Mapping[str, pa.Table]) -> dict[str, PartFacts]:
+        """Write a result's parts, each with its table's schema; a part is on disk when this returns.
+
+        Returns
+        -------
+        dict of str to PartFacts
+            By table.
 
         Raises
         ------
         ValueError
             A table does not fit its schema.
         """
+        facts = {}
         for name, table in tables.items():
             sink = pa.BufferOutputStream()
             pq.write_table(conform(name, table), sink, compression="zstd")
-            self.write(self.part_name(name, key), sink.getvalue().to_pybytes())
+            content = sink.getvalue().to_pybytes()
+            self.write(self.part_name(name, key), content)
+            facts[name] = _facts(content, table.num_rows)
+        return facts
+
+    def facts(self, file: str) -> PartFacts:
+        """Read a part that is there and tell what it is known by.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none.
+        ValueError
+            It is not a whole Parquet file.
+        """
+        content = self.read_bytes(file)
+        return _facts(content, pq.read_metadata(pa.BufferReader(content)).num_rows)
 
     def load(self, key: str, table: str) -> pa.Table:
         """Read one part."""
@@ -93,10 +151,11 @@ class Store:
     def write(self, name: str, content: bytes) -> None:
         """Put a file in place in one step: never half of it, whatever happens meanwhile."""
         filesystem, path = self.filesystem, self.path(name)
-        filesystem.makedirs(posixpath.dirname(path), exist_ok=True)
         if not isinstance(filesystem, LocalFileSystem):
+            filesystem.makedirs(posixpath.dirname(path), exist_ok=True)
             filesystem.pipe_file(path, content)
             return
+        _make_folder(Path(path).parent)
         temporary = Path(f"{path}.{uuid4().hex}.tmp")
         try:
             with temporary.open("wb") as file:
@@ -108,10 +167,87 @@ class Store:
             temporary.unlink(missing_ok=True)
         _sync_folder(Path(path).parent)
 
+    def create(self, name: str, content: bytes) -> None:
+        """Write a file that must not be there yet; on disk one writer at a time is presumed.
+
+        Raises
+        ------
+        FileExistsError
+            It is there, with other content.
+        """
+        filesystem, path = self.filesystem, self.path(name)
+        if isinstance(filesystem, LocalFileSystem):
+            if filesystem.exists(path):
+                raise FileExistsError(path)
+            self.write(name, content)
+            return
+        try:
+            filesystem.makedirs(posixpath.dirname(path), exist_ok=True)
+            filesystem.pipe_file(path, content, mode="create")
+        except FileExistsError:
+            # A request that was sent again, its answer being lost, finds what it wrote itself.
+            if self.read_bytes(name) != content:
+                raise
+
+    def version(self, name: str) -> str | None:
+        """Return what a file's state is known by where writes can depend on it (S3); else None."""
+        if not _writes_on_condition(self.filesystem):
+            return None
+        try:
+            return self.filesystem.info(self.path(name), refresh=True)["ETag"]
+        except FileNotFoundError:
+            return None
+
+    def replace(self, name: str, content: bytes, version: str | None) -> None:
+        """Replace a file, where writes can depend on it only if it still has that version (None: is absent).
+
+        Raises
+        ------
+        FileExistsError
+            Somebody else has written it meanwhile.
+        """
+        filesystem = self.filesystem
+        if not _writes_on_condition(filesystem):
+            self.write(name, content)
+            return
+        condition = {"IfMatch": version} if version else {"IfNoneMatch": "*"}
+        try:
+            filesystem.pipe_file(self.path(name), content, **condition)
+        except OSError as error:  # s3fs has no error of its own for a condition that does not hold
+            found = self.version(name)
+            if found == version:
+                raise
+            if found is None or self.read_bytes(name) != content:
+                raise FileExistsError(name) from error
+
+    def rename(self, name: str, other: str) -> None:
+        """Give a file on disk another name, in one step."""
+        Path(self.path(name)).replace(self.path(other))
+
+    def settle(self, folder: str) -> None:
+        """Make what was renamed and removed in a folder survive a power cut."""
+        if isinstance(self.filesystem, LocalFileSystem):
+            _sync_folder(Path(self.path(folder)))
+
+    def delete(self, name: str) -> None:
+        """Remove a file, if it is there."""
+        with suppress(FileNotFoundError):
+            self.filesystem.rm_file(self.path(name))
+
     def names(self, folder: str) -> list[str]:
         """List the files of a folder; none where there is no folder."""
         filesystem, path = self.filesystem, self.path(folder)
         return list(filesystem.ls(path, detail=False)) if filesystem.exists(path) else []
+
+    def sizes(self, folder: str) -> dict[str, int]:
+        """List all files below a folder, relative to the catalog, with their lengths."""
+        home = len(self.path(""))
+        found = self.filesystem.find(self.path(folder), detail=True)
+        return {path[home:]: info["size"] for path, info in sorted(found.items())}
+
+    def modified(self, name: str) -> datetime:
+        """Return when a file was written, UTC."""
+        return self.filesystem.modified(self.path(name)).astimezone(UTC)
 
     def read_bytes(self, name: str) -> bytes:
         """Read a small file.
@@ -122,6 +258,22 @@ class Store:
             There is none.
         """
         return self.filesystem.cat_file(self.path(name))
+
+
+def _writes_on_condition(filesystem: Any) -> bool:
+    return "s3" in filesystem.protocol
+
+
+def _facts(content: bytes, rows: int) -> PartFacts:
+    return PartFacts(rows, len(content), hashlib.blake2b(content, digest_size=16).hexdigest())
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder that survives a power cut as what is written in it does."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for made in reversed(missing):
+        _sync_folder(made.parent)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -24,6 +24,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -48,6 +49,26 @@ _NO_CACHE = 75  # exit status: what is written to stderr is for people
 
 class KernelCacheError(RuntimeError):
     """Compiled kernels cannot be kept; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class KernelCache:
+    """Where compiled kernels are kept, and whether all of them are there, of these very sources."""
+
+    folders: Sequence[Path]
+    compiled: bool
+
+
+def kernel_cache() -> KernelCache:
+    """Look for the compiled kernels.
+
+    Raises
+    ------
+    KernelCacheError
+        No folder can be written in which numba could keep the code.
+    """
+    folders = _cache_folders()
+    return KernelCache(folders, _compiled(folders))
 
 
 def compile_kernels(announce: Callable[[], object]) -> None:

@@ -3,8 +3,8 @@
 ``pose+travel`` (59 values, the default): the 19 canonical joints in the heading frame, in leg lengths, across
 and along from the pelvis and up from the clip's floor, over the square root of 19; then the root's velocity
 to its left and forward, in leg lengths a second, times tau. ``paper`` (54 values): the pelvis at the origin
-and the other 18 joints, in leg lengths over the square root of 18. Either way the distance of two frames is
-about the root-mean-square distance of their joints, in leg lengths.
+and the other 18 joints, in leg lengths over the square root of 18, computed from the former. Either way the
+distance of two frames is about the root-mean-square distance of their joints, in leg lengths.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ _CHAINS = [
     for side in ("left", "right")
 ]
 _TOES = [CANONICAL_JOINTS.index("left_toe"), CANONICAL_JOINTS.index("right_toe")]
+POSE_COLUMNS = 3 * len(CANONICAL_JOINTS)
+"""Leading columns of pose and travel that are pose."""
+
 _SMOOTHING = 5  # frames of the velocity's running mean
 
 
@@ -34,10 +37,8 @@ class FrameFeatures:
 
     Parameters
     ----------
-    values : array (T, d) float32
-        The feature of each frame, before merging.
-    pose_columns : int
-        How many leading columns are pose.
+    values : array (T, 59) float32
+        Pose and travel of each frame, before merging.
     path : array (T, 2)
         The root on the ground plane (x, z), leg lengths.
     height : array (T,)
@@ -51,7 +52,6 @@ class FrameFeatures:
     """
 
     values: NDArray[np.float32]
-    pose_columns: int
     path: FloatArray
     height: FloatArray
     heading: FloatArray
@@ -82,28 +82,35 @@ def motion_features(motion: Motion, config: FeatureConfig | None = None) -> NDAr
         The figure has no legs to measure it by.
     """
     config = config or FeatureConfig()
-    return merged(frame_features(motion, config), config).values
+    return merged(frame_features(motion, config).values, config).values
 
 
-def merged(features: FrameFeatures, config: FeatureConfig) -> Resampled:
-    """Merge the low-motion frames of a motion's features; only the pose drives the merging [DC 4.2]."""
-    return merge_low_motion(features.values, config.epsilon, config.criterion, driving=features.pose_columns)
+def merged(values: NDArray[np.float32], config: FeatureConfig) -> Resampled:
+    """Merge the low-motion frames of a motion [DC 4.2].
+
+    Parameters
+    ----------
+    values : array (T, 59) float32
+        Pose and travel.
+    config : FeatureConfig
+        The kind of feature that is merged, and the bound. Only the pose decides what is merged.
+    """
+    if config.kind == "paper":
+        values = _paper_pose(values)
+    driving = min(values.shape[1], POSE_COLUMNS)
+    return merge_low_motion(values, config.epsilon, config.criterion, driving=driving)
 
 
 def frame_features(motion: Motion, config: FeatureConfig) -> FrameFeatures:
-    """Compute the feature of every frame at the common rate; see `motion_features`."""
+    """Compute pose and travel of every frame at the common rate; see `motion_features`."""
     convention = find_convention(motion.skeleton.names, config.conventions)
     resampled = at_rate(motion, config.frame_rate)
     joints = resampled.positions()[:, canonical_indices(motion.skeleton, convention)]
     leg_length = _leg_length(joints, motion.name)
     floor = float(np.percentile(joints[:, _TOES, 1].min(axis=1), 2))
     normal = normalise(joints)
-    values = {"pose+travel": _pose_and_travel, "paper": _paper_pose}[config.kind](
-        normal, leg_length, floor, config
-    )
     return FrameFeatures(
-        values=values.astype(np.float32),
-        pose_columns=values.shape[1] - (2 if config.kind == "pose+travel" else 0),
+        values=_pose_and_travel(normal, leg_length, floor, config).astype(np.float32),
         path=normal.path / leg_length,
         height=(normal.height - floor) / leg_length,
         heading=normal.heading,
@@ -158,11 +165,11 @@ def _pose_and_travel(
     return np.hstack([pose.reshape(len(pose), -1), config.travel_time * travel])
 
 
-def _paper_pose(
-    normal: NormalisedPose, leg_length: float, _floor: float, _config: FeatureConfig
-) -> FloatArray:
-    others = normal.pose[:, 1:] - normal.pose[:, :1]
-    return others.reshape(len(others), -1) / (leg_length * np.sqrt(others.shape[1]))
+def _paper_pose(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    joints = values[:, :POSE_COLUMNS].astype(np.float64).reshape(len(values), -1, 3)
+    others = joints[:, 1:] - joints[:, :1]
+    scale = np.sqrt(joints.shape[1] / others.shape[1])
+    return (others * scale).reshape(len(values), -1).astype(np.float32)
 
 
 def _own_frame_velocity(normal: NormalisedPose, frame_rate: float) -> FloatArray:

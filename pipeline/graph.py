@@ -1,195 +1,354 @@
 """The Dask graph: which stage feeds which. Wiring, no mathematics.
 
-    files -> ingest (a batch) -> compare (two batches) -> cluster -> represent -> align (a batch) -> style
+    files -> ingest (a batch) -> resample -> compare (two batches) -> cluster -> identify
+             identify -> represent
+             represent -> align (a batch) -> style
+             represent -> name
 
-A result is named by its key: a digest of its stage's version and settings and of the keys of what it reads,
-down to the digests of the files. Equal keys mean equal results, so a task whose result is stored already has
-nothing to do. Tasks hand each other keys, never arrays; tables pass through the store that the caller gives.
+The three lines are built one after the other: what is to be done for the clusters is known when they are.
+
+A result is named by its key: a digest of its stage's version and settings and of what goes into it, down to
+the bytes of the files. Equal keys mean equal results, so a task whose result is stored has nothing to do. A
+task that has takes over what earlier results hold of its rows and computes the others; see
+`motionary.pipeline.layout`. Tasks hand each other keys, never arrays; tables pass through the store that the
+caller gives.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import Any, Protocol
+from typing import Any
 
 import pyarrow as pa
 from dask.task_spec import List, TaskRef
 from dask.task_spec import Task as DaskTask
 
 from motionary.pipeline.config import PipelineConfig
-from motionary.pipeline.readers.library import Source
-from motionary.pipeline.stages import align, cluster, compare, ingest, represent, style
+from motionary.pipeline.layout import Earlier, Layout, digest_of_settings
+from motionary.pipeline.origins import Block, clip_origins, pair_origins
+from motionary.pipeline.reuse import kept_alignments, kept_clusters
+from motionary.pipeline.stage_settings import stage_settings
+from motionary.pipeline.stages import (
+    align,
+    cluster,
+    compare,
+    identify,
+    ingest,
+    name,
+    represent,
+    resample,
+    style,
+)
+from motionary.pipeline.task import MAKES, IsStored, TableStore, Task, run_task
 
 
-class TableStore(Protocol):
-    """Where results are kept; it travels to the workers."""
-
-    def has(self, key: str, tables: Iterable[str]) -> bool:
-        """Say whether a result is stored whole."""
-
-    def save(self, key: str, tables: Mapping[str, pa.Table]) -> None:
-        """Store a result's tables."""
-
-    def load(self, key: str, table: str) -> pa.Table:
-        """Return a stored table."""
+def dask_graph(tasks: Iterable[Task], store: TableStore) -> dict[str, DaskTask]:
+    """Write tasks as Dask wants them; each computes to its `TaskReport`."""
+    names = {task.key: f"{task.stage}-{task.key}" for task in tasks}
+    return {
+        names[task.key]: DaskTask(
+            names[task.key], run_task, task, store,
+            List(*(TaskRef(names[key]) for key in task.after if key in names)),
+        )
+        for task in tasks
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class TaskReport:
-    """What a task tells its caller: whose result it made, in what time, or that it was there already."""
-
-    stage: str
-    key: str
-    seconds: float
-    computed: bool
-
-
-@dataclass(frozen=True)
-class Task:
-    """A task of the graph; `node` computes to its `TaskReport`.
-
-    `reads` are the keys of the results it waits for, `makes` the tables it stores.
-    """
-
-    stage: str
-    key: str
-    reads: tuple[str, ...]
-    makes: tuple[str, ...]
-    node: DaskTask
-
-
-def build_graph(
-    sources: Sequence[Source], labels: pa.Table, config: PipelineConfig, store: TableStore
-) -> list[Task]:
-    """Join the stages over a library.
+class LibraryGraph:
+    """The tasks over a library.
 
     Parameters
     ----------
-    sources : sequence of Source
-        Its clips, in clip_id order.
+    layout : Layout
+        Its clips.
     labels : pyarrow.Table
         Supplied labels: clip_id and text columns.
+    overrides : pyarrow.Table
+        What people called clips: clip_id, label.
     config : PipelineConfig
         Every stage's settings.
-    store : TableStore
-        Where results go.
-
-    Returns
-    -------
-    list of Task
-        Every task, after those it reads from.
+    earlier : Earlier
+        The run to build upon.
+    is_stored : callable
+        Asked for the results of that run.
     """
-    batches = batched_by_name(sources, config.distances.tile)
 
-    ingested = [_ingest_task(batch, config, store) for batch in batches]
-    tiles = [
-        _task(
-            store, "compare", compare.compare, compare.VERSION, compare.MAKES,
-            reads=[("resampled", [first]), ("resampled", [second])],
-            settings=_thresholds(config), arguments=(config.distances,),
-        )
-        for first, second in combinations_with_replacement(ingested, 2)
-    ]  # fmt: skip
-    clustered = _task(
-        store, "cluster", cluster.cluster, cluster.VERSION, cluster.MAKES,
-        reads=[("ingested", ingested), ("pairs", tiles)],
-        settings=(asdict(config.clusters), labels.to_pylist()), arguments=(labels, config.clusters),
-    )  # fmt: skip
-    represented = _task(
-        store, "represent", represent.represent, represent.VERSION, represent.MAKES,
-        reads=[("clips", [clustered]), ("members", [clustered]), ("pairs", tiles), ("features", ingested)],
-        settings=(asdict(config.clusters), config.alignment.weights),
-        arguments=(config.clusters, config.alignment),
-    )  # fmt: skip
-    aligned = [
-        _task(
-            store, "align", align.align, align.VERSION, align.MAKES,
-            reads=[("ingested", [batch]), ("frames", [batch]), ("features", [batch]),
-                   ("clusters", [represented]), ("reference_features", [represented])],
-            settings=asdict(config.alignment),
-            arguments=(config.alignment, config.features.frame_rate),
-        )
-        for batch in ingested
-    ]  # fmt: skip
-    styled = _task(
-        store, "style", style.style, style.VERSION, style.MAKES,
-        reads=[("clips", [clustered]), ("clusters", [represented]), ("aligned", aligned)],
-        settings=[asdict(one) for one in config.features.conventions],
-        arguments=(config.features.conventions, config.features.frame_rate),
-    )  # fmt: skip
-    return [*ingested, *tiles, clustered, represented, *aligned, styled]
+    layout: Layout
+    labels: pa.Table
+    overrides: pa.Table
+    config: PipelineConfig
+    earlier: Earlier
+    is_stored: IsStored
+
+    @cached_property
+    def settings(self) -> dict[str, str]:
+        """Of every stage, the digest of its version and settings."""
+        return stage_settings(self.config)
+
+    @cached_property
+    def ingested(self) -> list[Task]:
+        """Every batch read."""
+        made: list[Task] = []
+        for number, batch in enumerate(self.layout.batches):
+            about = [(clip.clip_id, clip.source.path, clip.key) for clip in batch]
+            origins = clip_origins(number, self.layout, self.earlier)
+            keys = {
+                one: self._earlier("ingest", one.batch) if one.earlier else made[one.batch].key
+                for one in origins
+            }
+            made.append(
+                Task(
+                    "ingest", self._key("ingest", about), ingest.ingest, reads=(),
+                    arguments=([(clip.key, clip.source) for clip in batch], self.config),
+                    carries=[(keys[one], names) for one, names in origins.items() if keys[one]],
+                )
+            )  # fmt: skip
+        return made
+
+    @cached_property
+    def resampled(self) -> list[Task]:
+        """Every batch with its low-motion frames merged."""
+        return [
+            Task(
+                "resample", self._key("resample", task.key), resample.resample,
+                reads=[("features", [task.key])], arguments=(self.config.features,),
+            )
+            for task in self.ingested
+        ]  # fmt: skip
+
+    @cached_property
+    def compared(self) -> list[Task]:
+        """Every tile of two batches, or of one, compared."""
+        tiles = [*combinations_with_replacement(range(len(self.layout.batches)), 2)]
+        contents = [[(clip.clip_id, clip.key) for clip in batch] for batch in self.layout.batches]
+        keys = {tile: self._key("compare", [contents[batch] for batch in tile]) for tile in tiles}
+        return [
+            Task(
+                "compare", keys[tile], compare.compare,
+                reads=[("resampled", [self.resampled[batch].key]) for batch in tile],
+                arguments=(self.config.distances,),
+                carries=self._carried_pairs(tile, keys),
+            )
+            for tile in tiles
+        ]  # fmt: skip
+
+    @cached_property
+    def clustered(self) -> Task:
+        """The library clustered."""
+        ingested = [task.key for task in self.ingested]
+        about = (ingested, self.labels.to_pylist(), self._named)
+        return Task(
+            "cluster", self._key("cluster", about), cluster.cluster,
+            reads=[("ingested", ingested), ("pairs", [task.key for task in self.compared])],
+            arguments=(self.labels, self.overrides, self.config.clusters),
+        )  # fmt: skip
+
+    @cached_property
+    def identified(self) -> Task:
+        """The clusters numbered. Where they are those of the earlier run, so are the numbers."""
+        same = self._earlier("cluster") == self.clustered.key
+        before = self._earlier("identify")
+        return Task(
+            "identify", before if same and before else self._key("identify", (self.clustered.key, before)),
+            identify.identify,
+            reads=[("groups", [self.clustered.key]), *((table, _list(before)) for table in identify.MAKES)],
+            arguments=(self.earlier.names_of(self.layout.digests), self.earlier.snapshot_id),
+        )  # fmt: skip
+
+    def comparison(self) -> list[Task]:
+        """List the tasks that lead to the clusters, each after those it reads from."""
+        return [*self.ingested, *self.resampled, *self.compared, self.clustered, self.identified]
+
+    def tasks_by_stage(self) -> dict[str, int]:
+        """Count the tasks of every stage."""
+        counts = dict.fromkeys(MAKES, 1)
+        counts["ingest"] = counts["resample"] = counts["align"] = len(self.ingested)
+        counts["compare"] = len(self.compared)
+        return counts
+
+    def contents_to_read(self) -> int:
+        """Count the different contents that no stored result holds."""
+        missing = [
+            {clip.key for clip in batch}.difference(
+                self.layout.keys[one] for _, names in task.carries or () for one in names
+            )
+            for task, batch in zip(self.ingested, self.layout.batches, strict=True)
+            if not self.is_stored(task.key, task.makes)
+        ]
+        return sum(map(len, missing))
+
+    def pairs_to_compare(self) -> int:
+        """Count the pairs that no stored result holds, were every clip to be read."""
+        tiles = combinations_with_replacement(self.layout.batches, 2)
+        count = 0
+        for task, (first, second) in zip(self.compared, tiles, strict=True):
+            if not self.is_stored(task.key, task.makes):
+                pairs = len(first) * (len(first) - 1) // 2 if first is second else len(first) * len(second)
+                count += pairs - _carried_count(task, within=first is second)
+        return count
+
+    def representation(self, members: pa.Table, earlier: pa.Table) -> Task:
+        """Choose the references.
+
+        Parameters
+        ----------
+        members : pyarrow.Table
+            What `identified` made.
+        earlier : pyarrow.Table
+            `represented` of the earlier run.
+        """
+        before = self._earlier_alike("represent")
+        kept = kept_clusters(members, self.layout, earlier, self.earlier) if before else {}
+        cluster_of = _pairs(members, "clip_id", "cluster_id")
+        batches = [
+            task.key
+            for task, batch in zip(self.ingested, self.layout.batches, strict=True)
+            if any(clip.clip_id in cluster_of and cluster_of[clip.clip_id] not in kept for clip in batch)
+        ]
+        about = [(one, cluster_id, self.layout.keys[one]) for one, cluster_id in cluster_of.items()]
+        return Task(
+            "represent", self._key("represent", about), represent.represent,
+            reads=[
+                ("members", [self.identified.key]), ("pairs", [task.key for task in self.compared]),
+                ("ingested", batches), ("features", batches),
+                ("centres", _list(before)), ("reference_features", _list(before)),
+            ],
+            arguments=(kept, self.config.clusters, self.config.alignment),
+        )  # fmt: skip
+
+    def alignment(self, represented: Task, references: pa.Table, earlier: pa.Table) -> list[Task]:
+        """List the tasks that need the references: align, style, name.
+
+        Parameters
+        ----------
+        represented : Task
+            Of `representation`.
+        references : pyarrow.Table
+            `represented` as it made it.
+        earlier : pyarrow.Table
+            The same of the earlier run.
+        """
+        kept = kept_alignments(references, self.layout, earlier, self.earlier)
+        about = kept.alignments_of(references)
+        aligned = []
+        for task, batch in zip(self.ingested, self.layout.batches, strict=True):
+            ids = [clip.clip_id for clip in batch if clip.clip_id in about]
+            alignments = ([clip.clip_id for clip in batch], [about[one] for one in ids])
+            carried = kept.by_batch(ids) if self._earlier_alike("align") else {}
+            aligned.append(
+                Task(
+                    "align", self._key("align", alignments), align.align,
+                    reads=[*((table, [task.key]) for table in ("ingested", "frames", "features")),
+                           *((table, [represented.key]) for table in ("represented", "reference_features"))],
+                    arguments=(self.config.alignment, self.config.features.frame_rate),
+                    carries=[
+                        (key, names) for number, names in carried.items()
+                        if (key := self._earlier("align", number))
+                    ],
+                )
+            )  # fmt: skip
+        return [
+            *aligned,
+            self._styled(represented, aligned, about, kept.whole_clusters),
+            self.naming(represented.key),
+        ]
+
+    def _styled(
+        self, represented: Task, aligned: Sequence[Task], about: Mapping[str, Any], kept: Mapping[str, str]
+    ) -> Task:
+        before = self._earlier_alike("style")
+        kept = kept if before else {}
+        batches = [
+            number
+            for number, batch in enumerate(self.layout.batches)
+            if any(clip.clip_id in about and clip.clip_id not in kept for clip in batch)
+        ]
+        return Task(
+            "style", self._key("style", [*about.values()]), style.style,
+            reads=[
+                ("represented", [represented.key]),
+                ("ingested", [self.ingested[number].key for number in batches]),
+                ("aligned", [aligned[number].key for number in batches]),
+                ("styles", _list(before)),
+            ],
+            arguments=(kept, self.config.features.conventions, self.config.features.frame_rate),
+        )  # fmt: skip
+
+    def naming(self, represented: str) -> Task:
+        """Name the clusters whose references are this result."""
+        return naming_task(self.clustered.key, represented, self.overrides, self.config)
+
+    @cached_property
+    def _named(self) -> list[tuple[str, str]]:
+        return _named(self.overrides)
+
+    def _key(self, stage: str, about: Any) -> str:
+        return digest_of_settings(stage, self.settings[stage], about)
+
+    def _earlier(self, stage: str, place: int = 0) -> str:
+        """Return the key of an earlier result; empty where there is none."""
+        keys = self.earlier.results.get(stage, ())
+        key = keys[place] if place < len(keys) else ""
+        return key if key and self.is_stored(key, MAKES[stage]) else ""
+
+    def _earlier_alike(self, stage: str) -> str:
+        """Return the key of a stage's earlier result, if it had these settings."""
+        return self._earlier(stage) if self.earlier.settings.get(stage) == self.settings[stage] else ""
+
+    def _carried_pairs(
+        self, tile: tuple[int, int], keys: Mapping[tuple[int, int], str]
+    ) -> list[tuple[str, Block]]:
+        alike = self.earlier.settings.get("compare") == self.settings["compare"]
+        found = []
+        for block in pair_origins(tile, self.layout, self.earlier):
+            if not block.origin.earlier:
+                found.append((keys[block.origin.batches], block))
+            elif alike and (key := self._earlier("compare", self.earlier.tile(*block.origin.batches))):
+                found.append((key, block))
+        return found
 
 
-def batched_by_name(sources: Sequence[Source], size: int) -> list[list[Source]]:
-    """Cut a library into batches of about `size` clips, twice that at most.
+def naming_task(clustered: str, represented: str, overrides: pa.Table, config: PipelineConfig) -> Task:
+    """Name clusters and clips.
 
-    A batch ends after a clip whose name says so, by its digest. So a clip that comes or goes changes its own
-    batch, not all that follow, and the results of the others are found again.
+    Parameters
+    ----------
+    clustered, represented : str
+        The keys of the results of these stages.
+    overrides : pyarrow.Table
+        What people called clips: clip_id, label.
+    config : PipelineConfig
+        `clusters` is used.
     """
-    batches: list[list[Source]] = [[]]
-    for source in sources:
-        batches[-1].append(source)
-        drawn = int.from_bytes(hashlib.blake2b(source.clip_id.encode(), digest_size=8).digest())
-        if drawn % size == 0 or len(batches[-1]) == 2 * size:
-            batches.append([])
-    return [batch for batch in batches if batch]
-
-
-def _ingest_task(batch: Sequence[Source], config: PipelineConfig, store: TableStore) -> Task:
-    files = [(source.clip_id, source.path, source.digest) for source in batch]
-    return _task(
-        store, "ingest", ingest.ingest, ingest.VERSION, ingest.MAKES,
-        reads=[], settings=(asdict(config.read), asdict(config.features), files), arguments=(batch, config),
+    about = (clustered, represented, _named(overrides))
+    return Task(
+        "name", digest_of_settings("name", stage_settings(config)["name"], about), name.name,
+        reads=[("clips", [clustered]), ("represented", [represented]), ("centres", [represented])],
+        arguments=(overrides, config.clusters),
     )  # fmt: skip
 
 
-def _thresholds(config: PipelineConfig) -> tuple[Any, ...]:
-    drawn = config.distances.thresholds == "random"
-    return (config.distances.thresholds, config.distances.seed if drawn else None)
+def _named(overrides: pa.Table) -> list[tuple[str, str]]:
+    return [*_pairs(overrides, "clip_id", "label").items()]
 
 
-def _task(
-    store: TableStore,
-    stage: str,
-    body: Callable[..., dict[str, pa.Table]],
-    version: int,
-    makes: tuple[str, ...],
-    reads: Sequence[tuple[str, Sequence[Task]]],
-    settings: Any,
-    arguments: tuple[Any, ...],
-) -> Task:
-    stored = [(table, [task.key for task in tasks]) for table, tasks in reads]
-    about = json.dumps([stage, version, settings, stored], sort_keys=True)
-    key = hashlib.blake2b(about.encode(), digest_size=16).hexdigest()
-    before = {task.key: TaskRef(task.node.key) for _, tasks in reads for task in tasks}
-    node = DaskTask(
-        f"{stage}-{key}", run_task, stage, key, makes, store, body, stored, arguments, List(*before.values())
-    )
-    return Task(stage, key, tuple(before), makes, node)
+def _carried_count(task: Task, *, within: bool) -> int:
+    """Count the pairs that blocks hold, none of a clip with itself; within one batch all are there twice."""
+    count = 0
+    for _, block in task.carries or ():
+        one, other = Counter(block.first.values()), Counter(block.second.values())
+        count += one.total() * other.total() - sum(one[there] * other[there] for there in one)
+    return count // 2 if within else count
 
 
-def run_task(
-    stage: str,
-    key: str,
-    makes: tuple[str, ...],
-    store: TableStore,
-    body: Callable[..., dict[str, pa.Table]],
-    reads: Sequence[tuple[str, Sequence[str]]],
-    arguments: tuple[Any, ...],
-    before: Sequence[TaskReport],
-) -> TaskReport:
-    """Run a stage's body on the tables it reads and store what it makes, unless that is stored already.
+def _pairs(table: pa.Table, one: str, other: str) -> dict[Any, Any]:
+    return dict(zip(table[one].to_pylist(), table[other].to_pylist(), strict=True))
 
-    `before` is what must have happened first; the tables themselves come from the store.
-    """
-    start = time.perf_counter()
-    computed = not store.has(key, makes)
-    if computed:
-        tables = [pa.concat_tables(store.load(one, table) for one in keys) for table, keys in reads]
-        store.save(key, body(*tables, *arguments))
-    return TaskReport(stage, key, time.perf_counter() - start, computed)
+
+def _list(key: str) -> list[str]:
+    return [key] if key else []

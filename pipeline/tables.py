@@ -1,6 +1,7 @@
 """The tables that the stages make: columns, types and units.
 
-`ingested`, `members` and `reference_features` pass from stage to stage; the others are a catalog's.
+`ingested`, `groups`, `members`, `represented`, `centres` and `reference_features` pass from stage to stage;
+the others are a catalog's.
 
 A column's unit and meaning stand in its field metadata (`unit`, `meaning`), so that they travel with the
 table wherever it is kept.
@@ -25,6 +26,7 @@ def table_field(
 
 
 _CLIP = table_field("clip_id", pa.string(), "path of the clip in the library, with /")
+_CLUSTER = table_field("cluster_id", pa.int32(), "number that the cluster keeps from run to run")
 _FLOATS = pa.list_(pa.float32())
 
 _SKELETON = pa.struct(
@@ -53,6 +55,14 @@ _INGESTED = [
 _POSE = [
     table_field("root_position", pa.list_(pa.float32(), 3), "root joint in the world", "source units"),
     table_field("rotations", _FLOATS, "local unit quaternions x y z w, joint by joint"),
+]
+
+_REFERENCE = [
+    table_field("clip_id", pa.string(), "the clip that represents the cluster"),
+    table_field("digest", pa.string(), "of that clip's bytes"),
+    table_field("size", pa.int32(), "clips in the cluster"),
+    table_field("frames", pa.int32(), "frames of the reference at the common rate"),
+    table_field("similarity_index", pa.float64(), "ln of [CoTW eq. 9]; null where it is 0", nullable=True),
 ]
 
 TABLES: dict[str, pa.Schema] = {
@@ -145,11 +155,39 @@ TABLES: dict[str, pa.Schema] = {
             table_field("ari_true", pa.float64(), "cut at that many clusters", nullable=True),
         ]
     ),
-    "members": pa.schema([_CLIP, table_field("cluster_id", pa.int32(), "from 1, by falling size")]),
+    "groups": pa.schema([_CLIP, table_field("group", pa.int32(), "from 0, by falling size")]),
+    "members": pa.schema([_CLIP, _CLUSTER]),
+    "lineage": pa.schema(
+        [
+            table_field("after", pa.string(), "snapshot that the clusters were compared with"),
+            table_field(
+                "event",
+                pa.string(),
+                "kept, moved (clips, between clusters that both stay), split, merged, new, gone",
+            ),
+            table_field("cluster_id", pa.int32(), "cluster that has the clips now", nullable=True),
+            table_field("previous_id", pa.int32(), "cluster that had them", nullable=True),
+            table_field("clips", pa.int32(), "how many"),
+        ]
+    ),
+    "represented": pa.schema(
+        [
+            _CLIP,
+            _CLUSTER,
+            table_field("is_reference", pa.bool_(), "whether the cluster is aligned to this clip"),
+            table_field("distance_to_reference", pa.float64(), "the primary distance", "feature"),
+        ]
+    ),
+    "centres": pa.schema(
+        [
+            _CLUSTER,
+            *_REFERENCE,
+        ]
+    ),
     "clusters": pa.schema(
         [
             _CLIP,
-            table_field("cluster_id", pa.int32(), "from 1, by falling size"),
+            _CLUSTER,
             table_field("label", pa.string(), "name", nullable=True),
             table_field("label_source", pa.string(), "override, supplied, propagated or unassigned"),
             table_field(
@@ -161,17 +199,10 @@ TABLES: dict[str, pa.Schema] = {
     ),
     "references": pa.schema(
         [
-            table_field("cluster_id", pa.int32(), "cluster"),
-            table_field("clip_id", pa.string(), "the clip that represents it"),
+            _CLUSTER,
+            _REFERENCE[0],
             table_field("label", pa.string(), "the cluster's name", nullable=True),
-            table_field("size", pa.int32(), "clips in the cluster"),
-            table_field("frames", pa.int32(), "frames of the reference at the common rate"),
-            table_field(
-                "similarity_index",
-                pa.float64(),
-                "ln of [CoTW eq. 9]; null where it is 0",
-                nullable=True,
-            ),
+            *_REFERENCE[1:],
         ]
     ),
     "reference_features": pa.schema(
@@ -248,12 +279,25 @@ TABLES: dict[str, pa.Schema] = {
             table_field("explained", _FLOATS, "share of the cluster's variance along each axis"),
         ]
     ),
+    "labels": pa.schema(
+        [
+            _CLIP,
+            table_field("digest", pa.string(), "of the clip's bytes when it was labelled"),
+            table_field("label", pa.string(), "what a person calls it"),
+            table_field("set_at", pa.timestamp("us", tz="UTC"), "when"),
+            table_field("set_by", pa.string(), "who"),
+        ]
+    ),
     "quarantine": pa.schema(
         [
             table_field("path", pa.string(), "clip_id the file would have had"),
             table_field("line", pa.int64(), "line of the file, from 1", nullable=True),
             table_field("reason", pa.string(), "what is wrong"),
             table_field("mend", pa.string(), "what to do about it"),
+            table_field("digest", pa.string(), "of its bytes; empty where they cannot be read"),
+            table_field(
+                "retry", pa.bool_(), "whether the next run reads it again though its bytes are the same"
+            ),
         ]
     ),
 }

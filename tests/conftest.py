@@ -1,12 +1,18 @@
 """Fixtures that more than one test module uses."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
+from motionary.catalog.schema import PUBLISHED, SCHEMAS
+from motionary.catalog.snapshot import Snapshot, current_snapshot, next_snapshot_id, publish
+from motionary.catalog.store import PartFacts, Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.synthetic import write_library
 from motionary.workflows import cli
@@ -63,3 +69,45 @@ def motionary(monkeypatch, capfdbinary):
         return stop.value.code, out if binary else out.decode(), err.decode()
 
     return call
+
+
+@pytest.fixture(scope="session")
+def publish_rows() -> Callable[..., Snapshot]:
+    """Return a way of publishing a snapshot without a run: of tables that are empty but for rows given.
+
+    `parts` names further, empty parts of `pairs`; a column that a row leaves out has any value of its type.
+    """
+
+    def publish_them(
+        store: Store, made: str | None = None, parts: Iterable[str] = (), **rows: Sequence[dict]
+    ) -> Snapshot:
+        before = current_snapshot(store)
+        tables: dict[str, list[str]] = {}
+        facts: dict[str, PartFacts] = {}
+        for name in PUBLISHED:
+            keys = [f"of-{next_snapshot_id(store)}" if name in rows else "none"]
+            for key in [*keys, *(parts if name == "pairs" else ())]:
+                file = store.part_name(name, key)
+                if not store.has(key, [name]):
+                    filled = [_filled(name, row) for row in rows.get(name, ())]
+                    store.save(key, {name: pa.Table.from_pylist(filled, SCHEMAS[name])})
+                facts[file] = store.facts(file)
+                tables.setdefault(name, []).append(file)
+        made = made or datetime.now(UTC).isoformat()
+        snapshot = Snapshot(next_snapshot_id(store), made, tables, facts)
+        publish(store, snapshot, before)
+        return replace(snapshot, after=before.snapshot_id if before else None)
+
+    return publish_them
+
+
+def _filled(name: str, row: dict) -> dict:
+    """Complete a row."""
+    text, moment, nothing = "", datetime(2020, 1, 1, tzinfo=UTC), {"joints": [], "parents": [], "offsets": []}
+    usual: dict[str, object] = {"string": text, "bool": False, "timestamp[us, tz=UTC]": moment}
+    filled = {}
+    for field in SCHEMAS[name]:
+        number = 0 if pa.types.is_integer(field.type) or pa.types.is_floating(field.type) else []
+        value = nothing if pa.types.is_struct(field.type) else usual.get(str(field.type), number)
+        filled[field.name] = row.get(field.name, None if field.nullable else value)
+    return filled

@@ -1,6 +1,7 @@
 """Stores, snapshots and queries."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -21,9 +22,10 @@ def store(request, tmp_path) -> Store:
 
 
 def empty_snapshot(store: Store, snapshot_id: str = "000001") -> Snapshot:
-    store.save("none", {name: SCHEMAS[name].empty_table() for name in PUBLISHED})
+    facts = store.save("none", {name: SCHEMAS[name].empty_table() for name in PUBLISHED})
     files = {name: [store.part_name(name, "none")] for name in PUBLISHED}
-    return Snapshot(snapshot_id, "2020-01-01T00:00:00+00:00", files)
+    parts = {files[name][0]: facts[name] for name in PUBLISHED}
+    return Snapshot(snapshot_id, "2020-01-01T00:00:00+00:00", files, parts)
 
 
 def test_parts_come_back_with_types_units_and_version(store):
@@ -59,7 +61,7 @@ def test_a_table_must_fit_its_schema():
 def test_publishing_and_opening(store):
     assert current_snapshot(store) is None
     assert next_snapshot_id(store) == "000001"
-    publish(store, empty_snapshot(store))
+    publish(store, empty_snapshot(store), after=None)
     catalog = Catalog.open(store.url)
     assert len(catalog.clips) == 0
     assert catalog.sql("select count(*) n from pairs")["n"].to_pylist() == [0]
@@ -68,16 +70,23 @@ def test_publishing_and_opening(store):
 
 def test_a_snapshot_names_every_table_and_only_files_that_exist(store):
     whole = empty_snapshot(store)
+    without = {name: files for name, files in whole.tables.items() if name != "pairs"}
     with pytest.raises(ValueError, match="lacks the tables pairs"):
-        publish(store, Snapshot("1", "", {k: v for k, v in whole.tables.items() if k != "pairs"}))
+        publish(store, replace(whole, tables=without), after=None)
+    gone = {**whole.tables, "clips": ["tables/clips/gone.parquet"]}
     with pytest.raises(ValueError, match="are not there: tables/clips/gone.parquet"):
-        publish(store, Snapshot("1", "", {**whole.tables, "clips": ["tables/clips/gone.parquet"]}))
+        publish(store, replace(whole, tables=gone), after=None)
+    (file,) = whole.tables["clips"]
+    unknown = {name: facts for name, facts in whole.parts.items() if name != file}
+    with pytest.raises(ValueError, match=f"has no facts of {file}"):
+        publish(store, replace(whole, parts=unknown), after=None)
     assert current_snapshot(store) is None
 
 
 def test_a_crash_between_manifest_and_current_leaves_the_old_snapshot(tmp_path, monkeypatch):
     store = Store(str(tmp_path))
-    publish(store, empty_snapshot(store))
+    first = empty_snapshot(store)
+    publish(store, first, after=None)
     usual = Store.write
 
     def crash(self, name, content):
@@ -87,7 +96,7 @@ def test_a_crash_between_manifest_and_current_leaves_the_old_snapshot(tmp_path, 
 
     monkeypatch.setattr(Store, "write", crash)
     with pytest.raises(OSError, match="power cut"):
-        publish(store, empty_snapshot(store, "000002"))
+        publish(store, empty_snapshot(store, "000002"), after=first)
     assert current_snapshot(store).snapshot_id == "000001"
 
 
@@ -108,7 +117,7 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
 def test_a_later_schema_is_refused(tmp_path):
     store = Store(str(tmp_path))
     snapshot = empty_snapshot(store)
-    publish(store, Snapshot(snapshot.snapshot_id, "", snapshot.tables, VERSION + 1))
+    publish(store, replace(snapshot, schema_version=VERSION + 1), after=None)
     with pytest.raises(CatalogError, match=f"schema version {VERSION + 1}.*install a newer"):
         Catalog.open(str(tmp_path))
 

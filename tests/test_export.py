@@ -302,9 +302,10 @@ def test_one_part_of_the_catalog_at_a_time(demo, tmp_path, monkeypatch, format_)
 
 def catalog_without(tmp_path: Path, *tables: str) -> Catalog:
     store = Store(str(tmp_path))
-    store.save("none", {name: SCHEMAS[name].empty_table() for name in PUBLISHED})
+    facts = store.save("none", {name: SCHEMAS[name].empty_table() for name in PUBLISHED})
     files = {name: [store.part_name(name, "none")] for name in PUBLISHED}
-    publish(store, Snapshot("000001", "2020-01-01T00:00:00+00:00", files))
+    parts = {files[name][0]: facts[name] for name in PUBLISHED}
+    publish(store, Snapshot("000001", "2020-01-01T00:00:00+00:00", files, parts), after=None)
     catalog = Catalog.open(str(tmp_path))
     kept = {name: files[name] for name in PUBLISHED if name not in tables}
     return Catalog(store, Snapshot(catalog.snapshot.snapshot_id, "", kept))
@@ -313,7 +314,7 @@ def catalog_without(tmp_path: Path, *tables: str) -> Catalog:
 def test_an_empty_catalog_and_an_old_one(tmp_path):
     with pytest.raises(CatalogError, match="holds no clips"):
         catalog_without(tmp_path).export(tmp_path / "out")
-    old = catalog_without(tmp_path, "aligned")
+    old = catalog_without(tmp_path / "old", "aligned")
     with pytest.raises(CatalogError, match="no table 'aligned'; an older motionary published it"):
         old.export(tmp_path / "out", aligned=True)
     with pytest.raises(CatalogError, match="no table 'aligned'"):

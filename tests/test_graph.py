@@ -11,11 +11,17 @@ from motionary.pipeline.config import (
     DistanceConfig,
     FeatureConfig,
     PipelineConfig,
+    ReadConfig,
 )
-from motionary.pipeline.graph import batched_by_name, build_graph
+from motionary.pipeline.graph import LibraryGraph
+from motionary.pipeline.layout import Earlier, batched_by_name, lay_out
 from motionary.pipeline.readers.library import Source
+from motionary.pipeline.stage_settings import reading_settings
+from motionary.pipeline.tables import TABLES
+from motionary.pipeline.task import Task
 
 NO_LABELS = pa.table({"clip_id": pa.array([], pa.string())})
+NOT_SAID = TABLES["labels"].empty_table()
 
 
 def library(clips: int) -> list[Source]:
@@ -23,9 +29,28 @@ def library(clips: int) -> list[Source]:
     return [Source(name, name, "", (name,), f"digest of {name}", "bvh") for name in names]
 
 
-def keys(sources, config=None, labels=NO_LABELS) -> dict[str, set[str]]:
+def graph_of(sources, config=None, labels=NO_LABELS, overrides=NOT_SAID) -> LibraryGraph:
+    earlier = Earlier()
+    config = config or PipelineConfig()
+    layout = lay_out(sources, reading_settings(config), config.distances.tile, earlier)
+    return LibraryGraph(layout, labels, overrides, config, earlier, lambda key, tables: True)
+
+
+def tasks_of(graph: LibraryGraph) -> list[Task]:
+    """All tasks, were all clips one cluster with the first as its reference."""
+    members = [{"clip_id": clip.clip_id, "cluster_id": 1} for clip in graph.layout]
+    rows = [
+        one | {"is_reference": not place, "distance_to_reference": 0.0} for place, one in enumerate(members)
+    ]
+    before = TABLES["represented"].empty_table()
+    represented = graph.representation(pa.Table.from_pylist(members, TABLES["members"]), before)
+    references = pa.Table.from_pylist(rows, TABLES["represented"])
+    return [*graph.comparison(), represented, *graph.alignment(represented, references, before)]
+
+
+def keys(sources, config=None, **given) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
-    for task in build_graph(sources, labels, config or PipelineConfig(), store=None):
+    for task in tasks_of(graph_of(sources, config, **given)):
         found.setdefault(task.stage, set()).add(task.key)
     return found
 
@@ -36,19 +61,19 @@ def changed(first, second) -> set[str]:
 
 def test_tasks_follow_what_they_read():
     seen = set()
-    for task in build_graph(library(100), NO_LABELS, PipelineConfig(), store=None):
-        assert set(task.reads) <= seen
+    for task in tasks_of(graph_of(library(100))):
+        assert set(task.after) <= seen
         seen.add(task.key)
-    assert len(seen) == len(
-        {task.key for task in build_graph(library(100), NO_LABELS, PipelineConfig(), None)}
-    )
+    counts = graph_of(library(100)).tasks_by_stage()
+    assert len(seen) == sum(counts.values())
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 32])
 def test_batches_hold_every_clip_once_in_order(size):
     sources = library(200)
-    batches = batched_by_name(sources, size)
-    assert [clip for batch in batches for clip in batch] == sources
+    clip_ids = [source.clip_id for source in sources]
+    batches = batched_by_name(clip_ids, size)
+    assert [clip for batch in batches for clip in batch] == clip_ids
     assert max(map(len, batches)) <= 2 * size
     assert all(batches)
 
@@ -63,31 +88,44 @@ def test_a_clip_more_leaves_most_results_as_they_were(place):
     assert kept > 0.5
 
 
+AFTER = ["ingest", "resample", "compare", "cluster", "identify", "represent", "align", "style", "name"]
+
+
+def from_stage(stage: str) -> set[str]:
+    """The stage and what follows it."""
+    return set(AFTER[AFTER.index(stage) :])
+
+
 def test_keys_cover_what_matters_to_a_stage_and_what_follows():
     sources, plain = library(40), keys(library(40))
-    everything = {"ingest", "compare", "cluster", "represent", "align", "style"}
+
+    def by(**stages) -> set[str]:
+        return changed(plain, keys(sources, PipelineConfig(**stages)))
+
     assert changed(plain, keys(sources)) == set()
-    assert changed(plain, keys(sources, PipelineConfig(features=FeatureConfig(epsilon=0.2)))) == everything
-    drawn = PipelineConfig(distances=DistanceConfig(thresholds="random"))
-    assert changed(plain, keys(sources, drawn)) == everything - {"ingest"}
-    seed = PipelineConfig(distances=DistanceConfig(seed=1))
-    assert changed(plain, keys(sources, seed)) == set()
-    primary = PipelineConfig(clusters=ClusterConfig(primary="complete"))
-    assert changed(plain, keys(sources, primary)) == {"cluster", "represent", "align", "style"}
+    assert by(read=ReadConfig(up="z")) == from_stage("ingest")
+    assert by(features=FeatureConfig(epsilon=0.2)) == from_stage("resample") - {"align", "style"}
+    assert by(features=FeatureConfig(travel_time=0.2)) == from_stage("ingest")
+    assert by(distances=DistanceConfig(thresholds="random")) == from_stage("compare") - {"align", "style"}
+    assert by(distances=DistanceConfig(seed=1)) == set()
+    # The same clips in the same cluster need no other reference, whatever linkage found them.
+    assert by(clusters=ClusterConfig(primary="complete")) == {"cluster", "identify", "name"}
+    assert by(clusters=ClusterConfig(reach=2.0)) == {"cluster", "identify", "name"}
+    assert by(alignment=AlignmentConfig(weights="legs")) == {"represent", "align", "style", "name"}
+    assert by(alignment=AlignmentConfig(search="full")) == {"align", "style"}
     labels = pa.table({"clip_id": ["clip-00001.bvh"], "action": ["walk"]})
-    assert changed(plain, keys(sources, labels=labels)) == {"cluster", "represent", "align", "style"}
-    weighted = PipelineConfig(alignment=AlignmentConfig(weights="legs"))
-    assert changed(plain, keys(sources, weighted)) == {"represent", "align", "style"}
-    thorough = PipelineConfig(alignment=AlignmentConfig(search="full"))
-    assert changed(plain, keys(sources, thorough)) == {"align", "style"}
+    assert changed(plain, keys(sources, labels=labels)) == {"cluster", "identify", "name"}
+    said = [{"clip_id": "clip-00001.bvh", "digest": "", "label": "run", "set_at": None, "set_by": ""}]
+    overrides = pa.Table.from_pylist(said, TABLES["labels"])
+    assert changed(plain, keys(sources, overrides=overrides)) == {"cluster", "identify", "name"}
     other = [Source(s.clip_id, s.path, s.root, s.files, s.digest + "!", s.format) for s in sources[:1]]
-    assert changed(plain, keys(other + sources[1:])) == everything
+    assert changed(plain, keys(other + sources[1:])) == set(AFTER)
 
 
 def test_the_time_to_build_a_graph_grows_with_its_tasks():
     def per_task(clips: int) -> float:
         start = time.process_time()
-        tasks = build_graph(library(clips), NO_LABELS, PipelineConfig(), store=None)
+        tasks = graph_of(library(clips)).comparison()
         return (time.process_time() - start) / len(tasks)
 
     per_task(200)

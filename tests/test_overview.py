@@ -85,9 +85,10 @@ def make_catalog(folder, demo, clip_ids, labels=NO_LABELS, config=None, quaranti
     run |= {"clips": len(ingested), "clusters": len(made["references"]), "quarantined": len(quarantine)}
     made["runs"] = pa.Table.from_pylist([run], schema=SCHEMAS["runs"])
     store = Store(str(folder))
-    store.save("made", {name: made[name] for name in PUBLISHED})
+    facts = store.save("made", {name: made[name] for name in PUBLISHED})
     files = {name: [store.part_name(name, "made")] for name in PUBLISHED}
-    publish(store, Snapshot("000001", "2020-01-01T00:00:00+00:00", files))
+    parts = {files[name][0]: facts[name] for name in PUBLISHED}
+    publish(store, Snapshot("000001", "2020-01-01T00:00:00+00:00", files, parts), after=None)
     return Catalog.open(str(folder))
 
 

@@ -5,7 +5,7 @@ import pytest
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.readers.library import Source
-from motionary.workflows.labels_file import LabelsError, read_labels
+from motionary.workflows.labels_file import LabelsError, supplied_labels
 from motionary.workflows.settings import PAPER, SettingsError, load_settings
 
 
@@ -68,7 +68,7 @@ def library(tmp_path) -> list[Source]:
 def labels(tmp_path, text: str, library: list[Source]):
     file = tmp_path / "labels.csv"
     file.write_text(text, encoding="utf-8-sig")
-    return read_labels(file, library, "action")
+    return supplied_labels(file, None, library, "action")
 
 
 def test_labels_by_path_or_clip_id(tmp_path, library):
@@ -90,7 +90,7 @@ def test_labels_by_path_or_clip_id(tmp_path, library):
         ("action\nwalk\n", "no column path or clip_id"),
         (
             "path,style\ntakes/a.bvh,sad\n",
-            "no column 'action'; name one of its columns with --label-column: path, style",
+            "no column 'action'; name one of its columns with --label-column: style",
         ),
         ("path,action\ntakes/a.bvh,x\ntakes/./a.bvh,y\n", "labels clip 'a.bvh' more than once, in rows 2, 3"),
         ("", "cannot be read as CSV"),

@@ -5,16 +5,21 @@ What computes is imported inside the commands, so that `--help` answers at once.
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from typing import Annotated, NoReturn
 
 import typer
 
+from motionary.workflows.commands.check import doctor, verify
+from motionary.workflows.commands.label import label
 from motionary.workflows.commands.look import query, status
+from motionary.workflows.commands.nightly import nightly
 from motionary.workflows.commands.options import FAILED, fail
 from motionary.workflows.commands.reproduce import reproduce
 from motionary.workflows.commands.run import demo, graph, run
+from motionary.workflows.commands.snapshots import diff, runs, vacuum
 from motionary.workflows.commands.take_out import export, transfer
 from motionary.workflows.errors import UserError
 
@@ -24,7 +29,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips.",
+    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips, 4 verification failed.",
 )
 
 
@@ -45,8 +50,12 @@ def motionary(
     """Cluster, name and align a library of motion capture: a dictionary of motion."""
 
 
-for command in (run, demo, status, query, graph, export, transfer, reproduce):
+COMMANDS = (
+    run, nightly, demo, status, query, runs, diff, graph, export, transfer, verify, vacuum, doctor, reproduce
+)  # fmt: skip
+for command in COMMANDS:
     app.command()(command)
+app.add_typer(label, name="label")
 
 
 def main() -> NoReturn:
@@ -56,8 +65,10 @@ def main() -> NoReturn:
     except BrokenPipeError:  # the reader has seen enough; nothing more may be written, at exit neither
         sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115
         sys.exit(FAILED)
-    except (UserError, OSError) as error:
+    except UserError as error:
         fail(str(error))
+    except OSError as error:
+        fail(_disk_fault(error))
     except Exception as error:
         from motionary.catalog import CatalogError
 
@@ -65,3 +76,21 @@ def main() -> NoReturn:
             raise
         fail(str(error))
     sys.exit(0)
+
+
+_MENDS = {
+    errno.ENOSPC: "make room there; what was published is as it was",
+    errno.EDQUOT: "the quota is used up: make room there; what was published is as it was",
+    errno.EROFS: "that folder cannot be written: name another, or mount it for writing",
+    errno.EACCES: "let this user write there, or name another folder",
+    errno.EPERM: "let this user write there, or name another folder",
+    errno.EMFILE: "allow more open files: ulimit -n",
+}
+
+
+def _disk_fault(error: OSError) -> str:
+    """Say what the disk refused, where, and what to do about it."""
+    if error.strerror is None or error.errno not in _MENDS:
+        return str(error)
+    where = f"{error.filename}: " if error.filename else ""
+    return f"{where}{error.strerror.lower()}; {_MENDS[error.errno]}"

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 import pyarrow as pa
 
 from motionary.pipeline.config import DistanceConfig, PipelineConfig
-from motionary.pipeline.graph import Task, build_graph
+from motionary.pipeline.graph import LibraryGraph
+from motionary.pipeline.layout import Earlier, lay_out
 from motionary.pipeline.readers.library import Source
+from motionary.pipeline.stage_settings import reading_settings
+from motionary.pipeline.tables import TABLES
+from motionary.pipeline.task import Task
 from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import NO_LABELS
 from motionary.workflows.main_job import library_sources
@@ -20,25 +24,15 @@ _BOX, _GAP, _COLUMN = (150, 26), 10, 250
 _MOST_IN_COLUMN = 40
 _COLOURS = {
     "ingest": "#0072b2",
+    "resample": "#999933",
     "compare": "#d55e00",
     "cluster": "#009e73",
+    "identify": "#666666",
     "represent": "#cc79a7",
     "align": "#56b4e9",
     "style": "#e69f00",
+    "name": "#333333",
 }
-
-
-class _NoStore:
-    """Stands where results would go; a picture computes nothing."""
-
-    def has(self, key: str, tables: Iterable[str]) -> bool:
-        raise NotImplementedError
-
-    def save(self, key: str, tables: Mapping[str, pa.Table]) -> None:
-        raise NotImplementedError
-
-    def load(self, key: str, table: str) -> pa.Table:
-        raise NotImplementedError
 
 
 def draw_graph(out: Path, library: Path | None) -> None:
@@ -63,15 +57,31 @@ def draw_graph(out: Path, library: Path | None) -> None:
         config = PipelineConfig(distances=DistanceConfig(tile=1))
     else:
         sources, config = library_sources([str(library)]), PipelineConfig()
-    tasks = build_graph(sources, NO_LABELS.table, config, _NoStore())
+    tasks = _tasks(sources, config)
     out.write_text(_text(tasks) if out.suffix == ".txt" else _svg(tasks), encoding="utf-8")
+
+
+def _tasks(sources: Sequence[Source], config: PipelineConfig) -> list[Task]:
+    """List all tasks, as if every clip could be read and all were one cluster."""
+    layout = lay_out(sources, reading_settings(config), config.distances.tile, Earlier())
+    empty = TABLES["labels"].empty_table()
+    graph = LibraryGraph(layout, NO_LABELS.table, empty, config, Earlier(), lambda key, tables: False)
+    members = [{"clip_id": clip.clip_id, "cluster_id": 1} for clip in layout]
+    references = [
+        one | {"is_reference": number == 0, "distance_to_reference": 0.0}
+        for number, one in enumerate(members)
+    ]
+    before = TABLES["represented"].empty_table()
+    represented = graph.representation(pa.Table.from_pylist(members, TABLES["members"]), before)
+    aligned = graph.alignment(represented, pa.Table.from_pylist(references, TABLES["represented"]), before)
+    return [*graph.comparison(), represented, *aligned]
 
 
 def _text(tasks: Sequence[Task]) -> str:
     names = _names(tasks)
     lines = []
     for task in tasks:
-        before = [names[key] for key in task.reads]
+        before = [names[key] for key in task.after]
         lines.append(f"{names[task.key]}" + (f" <- {', '.join(before)}" if before else ""))
     return "\n".join(lines) + "\n"
 
@@ -101,7 +111,7 @@ def _svg(tasks: Sequence[Task]) -> str:
         _line(places[key], places[task.key])
         for task in tasks
         if task.key in places
-        for key in task.reads
+        for key in task.after
         if key in places
     ]
     width = _GAP * 2 + _COLUMN * (len(columns) - 1) + _BOX[0]

@@ -6,14 +6,15 @@ import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import cache
+from contextlib import ExitStack, contextmanager
+from functools import cache, partial
 from urllib.parse import urlsplit
 
 from distributed import Client, LocalCluster, as_completed, get_worker
 
 from motionary.pipeline.compilation import KernelCacheError, compile_kernels
-from motionary.pipeline.graph import Task, TaskReport
+from motionary.pipeline.graph import dask_graph
+from motionary.pipeline.task import TableStore, Task, TaskReport
 from motionary.workflows.errors import UserError
 
 _COMPILING = "motionary-compiling"
@@ -23,46 +24,65 @@ class SchedulerError(UserError):
     """The Dask scheduler that was named cannot be reached, or its workers cannot compile."""
 
 
-def compute(
-    tasks: Sequence[Task],
-    workers: int,
-    address: str | None,
-    done: Callable[[str], None],
-    compiling: Callable[[], object] | None,
-) -> list[TaskReport]:
-    """Run every task.
+class Workers:
+    """Dask workers, started when there is first something to do.
 
     Parameters
     ----------
-    tasks : sequence of Task
-        Of a graph.
     workers : int
         Processes on this machine; 1 runs in this process. Not used with `address`.
     address : str, optional
         A running Dask scheduler.
-    done : callable
-        Called with the stage of every finished task.
-    compiling : callable, optional
-        Called once if the kernels must be compiled first, somewhere. None where no task will need them.
-
-    Returns
-    -------
-    list of TaskReport
-        In the order of the tasks.
-
-    Raises
-    ------
-    SchedulerError
-        Nothing answers at `address`, or a machine has no folder to keep compiled kernels in.
+    compiling : callable
+        Called once if the kernels must be compiled first, somewhere.
     """
-    with _client(workers, address) as client:
-        if compiling is not None:
-            compile_on_every_machine(client, compiling)
-        graph = {task.node.key: task.node for task in tasks}
-        futures = client.get(graph, list(graph), sync=False)
+
+    def __init__(self, workers: int, address: str | None, compiling: Callable[[], object]) -> None:
+        self._open = ExitStack()
+        self._start = partial(_client, workers, address)
+        self._compiling = compiling
+        self._client: Client | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._open.close()
+
+    def compute(
+        self, tasks: Sequence[Task], store: TableStore, done: Callable[[str], object]
+    ) -> list[TaskReport]:
+        """Run tasks.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            With all that they wait for and that is not stored.
+        store : TableStore
+            Where results are.
+        done : callable
+            Called with the stage of every finished task.
+
+        Returns
+        -------
+        list of TaskReport
+            In the order of the tasks.
+
+        Raises
+        ------
+        SchedulerError
+            Nothing answers at the address, or a machine has no folder to keep compiled kernels in.
+        """
+        if not tasks:
+            return []
+        if self._client is None:
+            self._client = self._open.enter_context(self._start())
+            compile_on_every_machine(self._client, self._compiling)
+        graph = dask_graph(tasks, store)
+        futures = self._client.get(graph, list(graph), sync=False)
         for _, report in as_completed(futures, with_results=True):
             done(report.stage)
-        return client.gather(futures)
+        return self._client.gather(futures)
 
 
 def compile_on_every_machine(client: Client, compiling: Callable[[], object]) -> None:

@@ -6,16 +6,17 @@ environment, options of the command line. Every field is described in `motionary
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import Field, ValidationError
 from pydantic_settings import (
     BaseSettings,
+    InitSettingsSource,
     PydanticBaseSettingsSource,
     SettingsConfigDict,
-    TomlConfigSettingsSource,
 )
 
 from motionary.pipeline.canonical import Convention
@@ -40,17 +41,27 @@ class SettingsError(UserError):
     """A setting is not valid; the message names it."""
 
 
-class _Settings(BaseSettings):
+class EnvironmentSettings(BaseSettings):
+    """Settings that the environment may override, as `MOTIONARY_TABLE__FIELD`."""
+
     model_config = SettingsConfigDict(
         env_prefix="MOTIONARY_", env_nested_delimiter="__", extra="forbid", frozen=True
     )
 
+
+class _Settings(EnvironmentSettings):
     read: ReadConfig = Field(default_factory=ReadConfig)
     features: FeatureConfig = Field(default_factory=FeatureConfig)
     distances: DistanceConfig = Field(default_factory=DistanceConfig)
     clusters: ClusterConfig = Field(default_factory=ClusterConfig)
     alignment: AlignmentConfig = Field(default_factory=AlignmentConfig)
     conventions: dict[str, dict[str, str]] = Field(default_factory=dict)
+
+
+_LARGEST, _LONGEST_LINE = 2**17, 1000
+"""Of a configuration: a long key with many dots takes tomllib memory by the square of their number."""
+
+_Model = TypeVar("_Model", bound=EnvironmentSettings)
 
 
 def load_settings(file: Path | None, options: Mapping[str, Mapping[str, Any]]) -> PipelineConfig:
@@ -69,10 +80,65 @@ def load_settings(file: Path | None, options: Mapping[str, Mapping[str, Any]]) -
     SettingsError
         The file is missing or not TOML, or a setting is unknown or out of range.
     """
-    if file is not None and not file.is_file():
-        raise SettingsError(f"no configuration file {file}")
+    return stage_settings(read_toml(file) if file else {}, options, file)
 
-    class FromFile(_Settings):
+
+def stage_settings(
+    tables: Mapping[str, Any], options: Mapping[str, Mapping[str, Any]], file: Path | None = None
+) -> PipelineConfig:
+    """Join the tables of a configuration file, the environment and the command line.
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown or out of range; the message begins with `file` where that is given.
+    """
+    settings = joined(_Settings, tables, options, file)
+    try:
+        own = tuple(Convention(name, joints) for name, joints in settings.conventions.items())
+    except ValueError as error:  # wrong joints
+        raise SettingsError(f"{file or 'settings'}: {error}") from None
+    features = FeatureConfig(**{**_fields(settings.features), "conventions": own})
+    return PipelineConfig(settings.read, features, settings.distances, settings.clusters, settings.alignment)
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """Read the tables of a configuration file.
+
+    Raises
+    ------
+    SettingsError
+        The file is missing, cannot be read or is not TOML.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+        if len(text) > _LARGEST or max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
+            limits = f"{_LARGEST:,} characters or has a line of more than {_LONGEST_LINE:,}"
+            raise SettingsError(f"{file} is no configuration: it is longer than {limits}; give a TOML file")
+        return tomllib.loads(text)
+    except (FileNotFoundError, IsADirectoryError):
+        raise SettingsError(f"no configuration file {file}") from None
+    except OSError as error:
+        raise SettingsError(f"configuration file {file} cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8, or brackets within brackets
+        raise SettingsError(f"{file}: {error}") from None
+
+
+def joined(
+    model: type[_Model],
+    tables: Mapping[str, Any],
+    options: Mapping[str, Mapping[str, Any]],
+    file: Path | None = None,
+) -> _Model:
+    """Fill a model of settings; later wins: the tables of a file, the environment, options.
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown or out of range; the message begins with `file` where that is given.
+    """
+
+    class Joined(model):  # type: ignore[misc, valid-type]
         @classmethod
         def settings_customise_sources(
             cls,
@@ -82,19 +148,18 @@ def load_settings(file: Path | None, options: Mapping[str, Mapping[str, Any]]) -
             dotenv_settings: PydanticBaseSettingsSource,
             file_secret_settings: PydanticBaseSettingsSource,
         ) -> tuple[PydanticBaseSettingsSource, ...]:
-            toml = TomlConfigSettingsSource(settings_cls, toml_file=file)
-            return (init_settings, env_settings, toml) if file else (init_settings, env_settings)
+            return (init_settings, env_settings, InitSettingsSource(settings_cls, dict(tables)))
 
     given: dict[str, Any] = {stage: dict(fields) for stage, fields in options.items()}
+    place = f"{file}: " if file else ""
     try:
-        settings = FromFile(**given)
-        own = tuple(Convention(name, joints) for name, joints in settings.conventions.items())
+        return Joined(**given)
     except ValidationError as error:
-        raise SettingsError("; ".join(_explained(one) for one in error.errors())) from None
-    except ValueError as error:  # a convention with wrong joints, or TOML that cannot be parsed
-        raise SettingsError(f"{file or 'settings'}: {error}") from None
-    features = FeatureConfig(**{**_fields(settings.features), "conventions": own})
-    return PipelineConfig(settings.read, features, settings.distances, settings.clusters, settings.alignment)
+        told = [_explained(one) for one in error.errors()]
+        more = f"; and {len(told) - 8} more" if len(told) > 8 else ""
+        raise SettingsError(place + "; ".join(told[:8]) + more) from None
+    except ValueError as error:  # a variable of the environment that cannot be parsed
+        raise SettingsError(f"{place or 'settings: '}{error}") from None
 
 
 def _fields(config: FeatureConfig) -> dict[str, Any]:
@@ -105,4 +170,6 @@ def _explained(error: Any) -> str:
     place = ".".join(map(str, error["loc"]))
     if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         return f"there is no setting {place}"
+    if error["type"] == "missing":
+        return f"setting {place} is missing"
     return f"setting {place}: {error['msg'].removeprefix('Value error, ')}"

@@ -9,15 +9,19 @@ from collections.abc import Sequence
 from typing import Literal
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from motionary.workflows.csv_cells import UNSAFE, csv_safe
+
 Format = Literal["table", "json", "csv", "parquet"]
 
 _WIDE = 200  # columns of a table that goes to a file or a pipe
+_TEXTS = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary, pa.types.is_large_binary)
 
 
 def output_console() -> Console:
@@ -34,14 +38,15 @@ def write_table(table: pa.Table, format_: Format) -> None:
     table : pyarrow.Table
         The answer.
     format_ : {"table", "json", "csv", "parquet"}
-        json is one list of objects; csv writes nested values as JSON text; table shortens them.
+        json is one list of objects; csv writes nested values as JSON text, and text such that no spreadsheet
+        takes it for a formula (`csv_plain` undoes that); table shortens nested values.
     """
     sink = sys.stdout.buffer
     if format_ == "json":
         text = json.dumps(table.to_pylist(), default=str, ensure_ascii=False, indent=1)
         sink.write(text.encode() + b"\n")
     elif format_ == "csv":
-        pa_csv.write_csv(_flat(table), sink)
+        pa_csv.write_csv(_csv_cells(table), sink)
     elif format_ == "parquet":
         pq.write_table(table, sink, compression="zstd")
     else:
@@ -63,15 +68,19 @@ def text_table(
     return Group(Text(title), made) if title else made
 
 
-def _flat(table: pa.Table) -> pa.Table:
+def _csv_cells(table: pa.Table) -> pa.Table:
+    """Turn nested values into JSON text, and text, also that of the header, into what is no formula."""
     for index, field in enumerate(table.schema):
+        column = table[index]
         if pa.types.is_nested(field.type):
-            text = [
-                None if value is None else json.dumps(value, default=str)
-                for value in table[index].to_pylist()
-            ]
-            table = table.set_column(index, field.name, pa.array(text, pa.string()))
-    return table
+            text = [None if value is None else json.dumps(value, default=str) for value in column.to_pylist()]
+            column = pa.chunked_array([pa.array(text, pa.string())])
+        elif pa.types.is_dictionary(field.type):
+            column = column.cast(field.type.value_type)
+        if any(is_text(column.type) for is_text in _TEXTS):
+            column = pc.replace_substring_regex(column, UNSAFE, r"'\1")
+        table = table.set_column(index, field.name, column)
+    return table.rename_columns([csv_safe(name) for name in table.column_names])
 
 
 def _shown(value: object) -> str:

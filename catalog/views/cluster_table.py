@@ -25,7 +25,7 @@ def cluster_table(catalog: Catalog) -> pa.Table:
         cluster_id, label (null: unnamed), size, purity (the commonest supplied label's share of the clips
         that have one; null where none has) and reference (a clip_id).
     """
-    references = catalog.references.to_arrow().sort_by("cluster_id")
+    references = catalog.references.to_arrow().sort_by([("size", "descending"), ("cluster_id", "ascending")])
     pure = _purity_by_cluster(catalog)
     return pa.table(
         {

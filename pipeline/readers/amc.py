@@ -56,9 +56,9 @@ def read_amc(path: Path, *, skeleton: Path | None = None) -> Motion:
     channels = {name: to_numbers(path, [frame[name] for frame in frames]) for name in frames[0]}
     values = {name: array.reshape(len(frames), -1) for name, array in channels.items()}
     rotations = [_local_rotation(asf, name, values.get(name), degrees, len(frames)) for name in asf.bones]
-    match = _RATE_IN_NAME.search(path.stem)
-    rate_note = "by the file's name" if match else "assumed: the format holds no rate"
-    fps = float(match[1]) if match else _USUAL_RATE
+    named = rate_in_name(path.stem)
+    rate_note = "by the file's name" if named else "assumed: the format holds no rate"
+    fps = named or _USUAL_RATE
     return Motion(
         name=path.stem,
         skeleton=_skeleton(asf),
@@ -69,6 +69,12 @@ def read_amc(path: Path, *, skeleton: Path | None = None) -> Motion:
         source=str(path),
         notes=(f"{fps:g} frames a second {rate_note}", *notes, *_left_out(asf, values)),
     )
+
+
+def rate_in_name(stem: str) -> float | None:
+    """Return the frames a second that an AMC's name ends with, if it does."""
+    match = _RATE_IN_NAME.search(stem)
+    return float(match[1]) if match else None
 
 
 def find_skeleton(stem: str, candidates: Iterable[Path]) -> Path | None:
@@ -136,7 +142,7 @@ def _frames(path: Path, lines: Sequence[str], sizes: dict[str, int]) -> tuple[li
             )
         frames[-1][bone] = (line, words[1:])
     if not frames:
-        raise ReadError(path, None, "the file has no frames", "copy or export it again")
+        raise ReadError(path, len(lines), "the file has no frames", "copy or export it again")
     return frames, starts
 
 
@@ -159,7 +165,7 @@ def _check_complete(path: Path, frames: list[Frame], starts: list[int], asf: Asf
             what = f"the {place}. frame has no line for bone {shown(missing[0])}{end}"
             raise ReadError(path, start, what, "copy or export the file again, or cut this frame off")
     if ROOT not in named:
-        raise ReadError(path, None, "no frame has a line for the root", "export the file again")
+        raise ReadError(path, starts[0], "no frame has a line for the root", "export the file again")
     resting = [name for name, bone in asf.bones.items() if bone.dof and name not in named]
     return [f"bones without a line, held at rest: {', '.join(resting)}"] if resting else []
 
@@ -188,8 +194,9 @@ def _root_position(asf: AsfSkeleton, values: FloatArray) -> FloatArray:
 
 def _skeleton(asf: AsfSkeleton) -> Skeleton:
     names = list(asf.bones)
+    place = {name: number for number, name in enumerate(names)}
     ends = {name: np.array(bone.direction) * bone.length for name, bone in asf.bones.items()}
-    parents = (-1, *(names.index(asf.parents[name]) for name in names[1:]))
+    parents = (-1, *(place[asf.parents[name]] for name in names[1:]))
     offsets = np.array([np.zeros(3), *(ends[asf.parents[name]] for name in names[1:])])
     return Skeleton(tuple(names), parents, offsets)
 

@@ -96,10 +96,12 @@ def read_asf(path: Path) -> AsfSkeleton:
     ReadError
         A section, a bone or a value is missing or malformed, or the hierarchy is not one tree.
     """
-    sections = _sections(path, read_lines(path))
+    lines = read_lines(path)
+    sections = _sections(path, lines)
     for name in (":root", ":bonedata", ":hierarchy"):
         if name not in sections:
-            raise ReadError(path, None, f"there is no {name} section", "check that this is a whole ASF file")
+            mend = "check that this is a whole ASF file"
+            raise ReadError(path, len(lines), f"there is no {name} section", mend)
     degrees, unit = _units(path, sections.get(":units", []))
     root, position = _root(path, sections[":root"])
     bones = _bones(path, sections[":bonedata"])
@@ -230,7 +232,8 @@ def _depth_first(path: Path, bones: dict[str, AsfBone], parents: dict[str, str])
     while waiting:
         order.append(waiting.pop())
         waiting += reversed(children[order[-1]])
-    lost = [bone for name, bone in bones.items() if name not in set(order)]
+    hung = set(order)
+    lost = [bone for name, bone in bones.items() if name not in hung]
     if lost:
         mend = "add it to :hierarchy, below root"
         raise ReadError(path, lost[0].line, f"bone {shown(lost[0].name)} does not hang from the root", mend)

@@ -42,6 +42,10 @@ from motionary.pipeline.readers.text import read_lines, shown, to_count, to_numb
 
 PositionRule = Literal["add", "replace"]
 
+SLOWEST = 1.0
+"""Seconds between two frames at most: a figure that is sampled more rarely is not in motion, and a frame time
+of a million seconds would grow by thirty million times when the motion is brought to the common rate."""
+
 _FRAMES = re.compile(r"\s*frames\s*:?\s*(\S*)\s*$", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*frame\s*time\s*:?\s*(\S*)\s*$", re.IGNORECASE)
 
@@ -124,7 +128,7 @@ def _frame_time(path: Path, header: list[tuple[int, str]], motion_line: int) -> 
         mend = "write the seconds between two frames there, as in `Frame Time: 0.0083333`"
         raise ReadError(path, line, f"expected `Frame Time: S` and found {shown(text)}", mend)
     value = float(to_numbers(path, [(line, [match[1]])])[0])
-    if not 1e-6 <= value <= 1e6:
+    if not 1e-6 <= value <= SLOWEST:
         mend = "write the seconds between two frames there, as in `Frame Time: 0.0083333`"
         raise ReadError(path, line, f"a frame time of {shown(match[1])} s is impossible", mend)
     return match[1]
@@ -162,13 +166,18 @@ def _rate(frame_time: str) -> float:
 def _distinct_names(names: list[str]) -> tuple[list[str], list[str]]:
     """Give a name that stands again a number, and say so."""
     taken, distinct, notes = set(names), [], []
-    for place, name in enumerate(names):
-        new, number = name, 2
-        if name in names[:place]:
+    seen: dict[str, int] = {}  # the number that a name's last repetition got
+    for name in names:
+        new = name
+        if name in seen:
+            number = seen[name] + 1
             while (new := f"{name}_{number}") in taken:
                 number += 1
             taken.add(new)
+            seen[name] = number
             notes.append(f"joint name {name!r} stands again: renamed to {new!r}")
+        else:
+            seen[name] = 1
         distinct.append(new)
     return distinct, notes
 

@@ -24,8 +24,8 @@ from motionary.pipeline.evaluation import adjusted_rand_index, best_reward_punis
 from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.pipeline.tables import LABEL_COLUMNS, TABLES
 
-VERSION = 1
-MAKES = ("clips", "linkage", "partitions", "cuts", "members")
+VERSION = 2
+MAKES = ("clips", "linkage", "partitions", "cuts", "groups")
 
 _LINKAGES = {"complete": complete_linkage, "ward": ward_linkage, "average": average_linkage}
 _METRICS = ("dtw", "b_dtw", "weighted")
@@ -55,30 +55,33 @@ class Dendrogram:
 
 
 def cluster(
-    ingested: pa.Table, pairs: pa.Table, labels: pa.Table, config: ClusterConfig
+    ingested: pa.Table, pairs: pa.Table, labels: pa.Table, overrides: pa.Table, config: ClusterConfig
 ) -> dict[str, pa.Table]:
     """Cluster the clips of a library by all distances and linkages, and publish one of the partitions.
 
     Parameters
     ----------
     ingested : pyarrow.Table
-        Every clip, in clip_id order.
+        Every clip.
     pairs : pyarrow.Table
         Every pair of them.
     labels : pyarrow.Table
         clip_id and text columns; clips without a row have no supplied labels.
+    overrides : pyarrow.Table
+        clip_id and label of the clips that a person named; the cut goes by these names first.
     config : ClusterConfig
         Linkage, distance, cut and the label column.
 
     Returns
     -------
     dict of str to pyarrow.Table
-        `clips` (with their labels), `linkage`, `partitions`, `cuts` and `members`.
+        `clips` (with their supplied labels), `linkage`, `partitions`, `cuts` and `groups`; clips stand in
+        clip_id order.
     """
-    clips = join_labels(ingested, labels)
+    clips = join_labels(ingested.sort_by("clip_id"), labels)
     if len(clips) == 0:
         return {name: TABLES[name].empty_table() for name in MAKES} | {"clips": clips}
-    classes = clips[config.label_column].to_pylist() if config.label_column in clips.column_names else None
+    classes = _classes(clips, overrides, config.label_column)
     dendrograms = _dendrograms(clips["clip_id"], pairs, config)
     primary = next(one for one in dendrograms if _is_primary(one, config))
     published = choose_cut(primary.linkage, primary.distances, config, labels=classes)
@@ -89,11 +92,30 @@ def cluster(
         "cuts": pa.concat_tables(
             [_cut_row(one, classes, published if one is primary else None) for one in dendrograms]
         ),
-        "members": pa.table(
-            {"clip_id": clips["clip_id"], "cluster_id": pa.array(published.labels + 1, pa.int32())},
-            schema=TABLES["members"],
+        "groups": pa.table(
+            {"clip_id": clips["clip_id"], "group": pa.array(published.labels, pa.int32())},
+            schema=TABLES["groups"],
         ),
     }
+
+
+def own_labels(clips: pa.Table, column: str) -> list[str | None]:
+    """Return the label supplied with every clip, None where there is none."""
+    if column not in clips.column_names:
+        return [None] * len(clips)
+    return [label or None for label in clips[column].to_pylist()]
+
+
+def own_overrides(clips: pa.Table, overrides: pa.Table) -> list[str | None]:
+    """Return what a person called every clip, None where nobody did."""
+    named = dict(zip(overrides["clip_id"].to_pylist(), overrides["label"].to_pylist(), strict=True))
+    return [named.get(clip_id) for clip_id in clips["clip_id"].to_pylist()]
+
+
+def _classes(clips: pa.Table, overrides: pa.Table, column: str) -> list[str | None] | None:
+    both = zip(own_labels(clips, column), own_overrides(clips, overrides), strict=True)
+    classes = [label if override is None else override for label, override in both]
+    return classes if any(one is not None for one in classes) else None
 
 
 def join_labels(ingested: pa.Table, labels: pa.Table) -> pa.Table:

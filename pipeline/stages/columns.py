@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -10,9 +11,6 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from motionary.pipeline.clustering.condensed import places_of
-
-POSE_COLUMNS = 57
-"""Leading columns of `features` that are pose, 19 joints by 3; the two after them are travel."""
 
 
 def vectors(rows: NDArray) -> pa.Array:
@@ -34,13 +32,45 @@ def matrix(column: pa.ChunkedArray) -> NDArray:
     return array.flatten().to_numpy(zero_copy_only=False).reshape(len(array), -1)
 
 
-def per_clip(table: pa.Table) -> dict[str, pa.Table]:
+def per_clip(table: pa.Table, column: str = "clip_id") -> dict[str, pa.Table]:
     """Split a table, whose rows stand clip by clip, into one table a clip (without copying)."""
-    ids = table["clip_id"].combine_chunks().dictionary_encode()
+    ids = table[column].combine_chunks().dictionary_encode()
     codes = ids.indices.to_numpy(zero_copy_only=False)
     bounds = np.append(np.flatnonzero(np.diff(codes, prepend=-1)), len(codes))
     names = ids.dictionary.to_pylist()
     return {names[codes[start]]: table.slice(start, end - start) for start, end in pairwise(bounds)}
+
+
+def renamed(table: pa.Table, clip_id: str, column: str = "clip_id") -> pa.Table:
+    """Give every row of a table this clip."""
+    place = table.schema.get_field_index(column)
+    return table.set_column(place, table.schema.field(place), pa.repeat(clip_id, len(table)))
+
+
+def carried_rows(
+    carried: Sequence[tuple[Mapping[str, pa.Table], Mapping[str, str]]], table: str, column: str = "clip_id"
+) -> dict[str, pa.Table]:
+    """Find what earlier results hold of clips, under the names that the clips have now.
+
+    Parameters
+    ----------
+    carried : sequence of (tables, names)
+        Of each result its tables, and of each clip what it is called there.
+    table : str
+        Which of the tables; its rows stand clip by clip.
+    column : str
+        Holds the clip.
+
+    Returns
+    -------
+    dict of str to pyarrow.Table
+        A table a clip; a clip that has no rows there is left out.
+    """
+    found = {}
+    for tables, names in carried:
+        rows = per_clip(tables[table], column)
+        found |= {here: renamed(rows[there], here, column) for here, there in names.items() if there in rows}
+    return found
 
 
 def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> NDArray[np.int64]:

@@ -2,52 +2,199 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from motionary.pipeline.config import DistanceConfig
+from motionary.pipeline.origins import Block
 from motionary.pipeline.stages.columns import matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
 VERSION = 1
 MAKES = ("pairs",)
 
+Values = dict[str, NDArray[np.float32]]
+"""Of every distance, its values for all clips of one batch with all of another."""
 
-def compare(first: pa.Table, second: pa.Table, config: DistanceConfig) -> dict[str, pa.Table]:
+
+def compare(
+    first: pa.Table,
+    second: pa.Table,
+    config: DistanceConfig,
+    carried: Sequence[tuple[dict[str, pa.Table], Block]] = (),
+) -> dict[str, pa.Table]:
     """Compute every distance between the clips of two batches.
 
     Parameters
     ----------
     first, second : pyarrow.Table
-        `resampled` of two batches, the earlier in clip_id order first, or twice of one; a pair of
-        clips is compared once.
+        `resampled` of two batches, or twice of one; a pair of clips is compared once.
     config : DistanceConfig
         The thresholds.
+    carried : sequence of (tables, Block)
+        Earlier results that hold some of the pairs.
 
     Returns
     -------
     dict of str to pyarrow.Table
         `pairs`.
     """
-    from motionary.pipeline.distances import THRESHOLDS, compare_clips, pairwise_distances, random_thresholds
-
-    thresholds = THRESHOLDS if config.thresholds == "midpoints" else random_thresholds(config.seed)
-    one, other = per_clip(first), per_clip(second)
-    clips, others = ([matrix(clip["feature"]) for clip in batch.values()] for batch in (one, other))
-    if one.keys() == other.keys():
-        result = pairwise_distances(clips, n_jobs=1, thresholds=thresholds)
-        i, j = np.triu_indices(len(clips), 1)
+    one, other = _distinct(first), _distinct(second)
+    values, known = _carried(one.names, other.names, carried)
+    if one.clip_ids == other.clip_ids:
+        _compute_within(values, known, one.clips, config)
+        i, j = np.triu_indices(len(one.clip_ids), 1)
+        twins = one.place[i[one.place[i] == one.place[j]]]
+        for itself in np.unique(twins):
+            _compare(values, *np.array([[itself], [itself]]), one.clips, one.clips, config)
     else:
-        result = compare_clips(clips, others, thresholds)
-        i, j = np.indices((len(clips), len(others))).reshape(2, -1)
-    curve = result.curve.astype(np.float32).reshape(-1)
-    columns = {
-        "clip_a": pa.array([*one], pa.string()).take(pa.array(i)),
-        "clip_b": pa.array([*other], pa.string()).take(pa.array(j)),
-        "curve": pa.FixedSizeListArray.from_arrays(curve, len(thresholds)),
+        _compute_between(values, known, one.clips, other.clips, config)
+        i, j = np.indices((len(one.clip_ids), len(other.clip_ids))).reshape(2, -1)
+    a, b = (pa.array(side.clip_ids, pa.string()).take(pa.array(k)) for side, k in ((one, i), (other, j)))
+    in_order = pc.less(a, b)
+    columns = {"clip_a": pc.if_else(in_order, a, b), "clip_b": pc.if_else(in_order, b, a)}
+    for name in _distances():
+        found = values[name][one.place[i], other.place[j]]
+        columns[name] = (
+            pa.FixedSizeListArray.from_arrays(found.reshape(-1), found.shape[1])
+            if name == "curve"
+            else pa.array(found)
+        )
+    return {"pairs": pa.table(columns, schema=TABLES["pairs"])}
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """A batch: its clips, and of those with equal frames the first, which stands for the others.
+
+    `place` says of every clip which of `names` and `clips` stands for it.
+    """
+
+    clip_ids: list[str]
+    names: list[str]
+    clips: list[NDArray]
+    place: NDArray[np.intp]
+
+
+def _distinct(resampled: pa.Table) -> _Side:
+    place_of: dict[bytes, int] = {}
+    batch = per_clip(resampled)
+    names, clips, place = [], [], []
+    for clip_id, rows in batch.items():
+        frames = matrix(rows["feature"])
+        place.append(place_of.setdefault(frames.tobytes(), len(names)))
+        if place[-1] == len(names):
+            names.append(clip_id)
+            clips.append(frames)
+    return _Side([*batch], names, clips, np.array(place, dtype=np.intp))
+
+
+def _distances() -> list[str]:
+    return [name for name in TABLES["pairs"].names if name not in ("clip_a", "clip_b")]
+
+
+def _carried(
+    ids: Sequence[str], other_ids: Sequence[str], carried: Sequence[tuple[dict[str, pa.Table], Block]]
+) -> tuple[Values, NDArray[np.bool_]]:
+    """Lay out what earlier results hold, and say which pairs those are."""
+    shape = (len(ids), len(other_ids))
+    width = TABLES["pairs"].field("curve").type.list_size
+    values = {
+        name: np.zeros((*shape, width) if name == "curve" else shape, np.float32) for name in _distances()
     }
-    for name in ("dtw", "b_dtw", "weighted", "fuzzy_low", "fuzzy_high"):
-        columns[name] = pa.array(getattr(result, name).astype(np.float32).reshape(-1))
-    return {
-        "pairs": pa.table({name: columns[name] for name in TABLES["pairs"].names}, schema=TABLES["pairs"])
-    }
+    known = np.zeros(shape, dtype=bool)
+    for tables, block in carried:
+        pairs = tables["pairs"]
+        rows = _rows(
+            pairs, [block.first.get(one, "") for one in ids], [block.second.get(one, "") for one in other_ids]
+        )
+        here = rows >= 0
+        taken = pairs.take(pa.array(rows[here]))
+        for name, value in values.items():
+            column = taken[name].combine_chunks()
+            value[here] = (
+                column.flatten().to_numpy().reshape(-1, width) if name == "curve" else column.to_numpy()
+            )
+        known |= here
+    return values, known
+
+
+def _rows(pairs: pa.Table, firsts: Sequence[str], seconds: Sequence[str]) -> NDArray[np.int64]:
+    """Find the row of each pair of clips, whichever comes first in it; -1 where there is none."""
+    sides = [*pairs["clip_a"].chunks, *pairs["clip_b"].chunks]
+    names = pc.unique(pa.chunked_array(sides, pa.string()))
+    row_of = np.full((len(names) + 1,) * 2, -1)
+    a, b = (pc.index_in(pairs[side], names).to_numpy() for side in ("clip_a", "clip_b"))
+    row_of[a, b] = row_of[b, a] = np.arange(len(pairs))
+    here = (
+        pc.fill_null(pc.index_in(pa.array(side, pa.string()), names), len(names)).to_numpy()
+        for side in (firsts, seconds)
+    )
+    return row_of[np.ix_(*here)]
+
+
+def _compute_between(
+    values: Values,
+    known: NDArray[np.bool_],
+    clips: Sequence[NDArray],
+    others: Sequence[NDArray],
+    config: DistanceConfig,
+) -> None:
+    """Compute the unknown pairs of two batches: together those columns that lack the same rows."""
+    lacking, group_of = np.unique(~known, axis=1, return_inverse=True)
+    for group, lacks in enumerate(lacking.T):
+        columns = np.flatnonzero(group_of.reshape(-1) == group)
+        _compare(values, np.flatnonzero(lacks), columns, clips, others, config)
+
+
+def _compute_within(
+    values: Values, known: NDArray[np.bool_], clips: Sequence[NDArray], config: DistanceConfig
+) -> None:
+    """Compute the pairs of one batch that are not known; the part above the diagonal counts."""
+    known = known | known.T
+    new = np.flatnonzero(~known.any(axis=1))
+    old = np.flatnonzero(known.any(axis=1))
+    _compare(values, old, new, clips, clips, config)
+    for name in values:
+        values[name][np.ix_(new, old)] = np.swapaxes(values[name][np.ix_(old, new)], 0, 1)
+    # Among the old ones a pair is missing only where an earlier result had one clip under two names.
+    lacking = old[(~known[np.ix_(old, old)]).sum(axis=1) > 1]
+    for some in (new, lacking):
+        _among(values, some, clips, config)
+
+
+def _among(values: Values, some: NDArray[np.intp], clips: Sequence[NDArray], config: DistanceConfig) -> None:
+    from motionary.pipeline.distances import pairwise_distances
+
+    found = pairwise_distances([clips[k] for k in some], n_jobs=1, thresholds=_thresholds(config))
+    i, j = np.triu_indices(len(some), 1)
+    for name, value in values.items():
+        value[some[i], some[j]] = value[some[j], some[i]] = getattr(found, name)
+
+
+def _compare(
+    values: Values,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    clips: Sequence[NDArray],
+    others: Sequence[NDArray],
+    config: DistanceConfig,
+) -> None:
+    from motionary.pipeline.distances import compare_clips
+
+    if not (len(rows) and len(columns)):
+        return
+    found = compare_clips([clips[k] for k in rows], [others[k] for k in columns], _thresholds(config))
+    for name in values:
+        values[name][np.ix_(rows, columns)] = getattr(found, name)
+
+
+def _thresholds(config: DistanceConfig) -> tuple[float, ...]:
+    from motionary.pipeline.distances import THRESHOLDS, random_thresholds
+
+    return THRESHOLDS if config.thresholds == "midpoints" else random_thresholds(config.seed)

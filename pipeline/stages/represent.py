@@ -1,6 +1,8 @@
-"""Clusters -> the clip that represents each, and what the clusters and their clips are called."""
+"""Clusters -> the clip that represents each [CoTW 5]."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 import pyarrow as pa
@@ -8,122 +10,117 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import squareform
 
 from motionary.pipeline.alignment import joint_weights, score_references
-from motionary.pipeline.clustering import Names, name_clusters
+from motionary.pipeline.alignment.reference import ReferenceScores
 from motionary.pipeline.config import AlignmentConfig, ClusterConfig
-from motionary.pipeline.stages.columns import POSE_COLUMNS, condensed, condensed_places, matrix, per_clip
+from motionary.pipeline.features import POSE_COLUMNS
+from motionary.pipeline.stages.columns import condensed, condensed_places, matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
-VERSION = 2
-MAKES = ("clusters", "references", "reference_features")
+VERSION = 3
+MAKES = ("represented", "centres", "reference_features")
 
 
 def represent(
-    clips: pa.Table,
     members: pa.Table,
     pairs: pa.Table,
+    ingested: pa.Table,
     features: pa.Table,
+    centres: pa.Table,
+    reference_features: pa.Table,
+    kept: Mapping[int, str],
     config: ClusterConfig,
     alignment: AlignmentConfig,
 ) -> dict[str, pa.Table]:
-    """Choose each cluster's reference by the similarity index [CoTW 5] and name clusters and clips [DC 5].
+    """Choose each cluster's reference by the similarity index.
 
     Parameters
     ----------
-    clips : pyarrow.Table
-        Every clip with its supplied labels, in clip_id order.
     members : pyarrow.Table
-        The cluster of every clip, in the same order.
+        The cluster of every clip, in clip_id order.
     pairs : pyarrow.Table
         Every pair of clips.
-    features : pyarrow.Table
-        Every clip's frames at the common rate.
+    ingested, features : pyarrow.Table
+        The clips of clusters that are not `kept`, and maybe more, and their frames at the common rate.
+    centres, reference_features : pyarrow.Table
+        What this stage made in the earlier run.
+    kept : mapping of int to str
+        Clusters whose clips are what they were, and what their reference is called now.
     config : ClusterConfig
-        The distance, the label column and the reach of a name.
+        The distance.
     alignment : AlignmentConfig
         The weights, which the similarity index shares with the alignment.
 
     Returns
     -------
     dict of str to pyarrow.Table
-        `clusters`, `references` and `reference_features`.
+        `represented`, `centres` and `reference_features`.
     """
-    if len(clips) == 0:
-        return {name: TABLES[name].empty_table() for name in MAKES}
-    clip_ids = clips["clip_id"].to_pylist()
+    clip_ids = members["clip_id"].to_pylist()
     cluster_of = members["cluster_id"].to_numpy()
-    places = condensed_places(pairs, clips["clip_id"])
+    places = condensed_places(pairs, members["clip_id"])
     square, weighted = (squareform(condensed(pairs, name, places)) for name in (config.metric, "weighted"))
+    digests = dict(zip(ingested["clip_id"].to_pylist(), ingested["digest"].to_pylist(), strict=True))
     sequences = per_clip(features)
     weights = joint_weights(alignment.weights)
+    earlier = {row["cluster_id"]: row for row in centres.to_pylist()}
+    earlier_features = _by_cluster(reference_features)
 
-    reference_of: dict[int, int] = {}
-    similarity: dict[int, float] = {}
+    reference = np.zeros(len(clip_ids), dtype=np.intp)
+    rows, representing = [], [TABLES["reference_features"].empty_table()]
     for one in np.unique(cluster_of).tolist():
         inside = np.flatnonzero(cluster_of == one)
-        poses = [matrix(sequences[clip_ids[i]]["feature"])[:, :POSE_COLUMNS] for i in inside]
-        scores = score_references(poses, weights, distances=weighted[np.ix_(inside, inside)])
-        reference_of[one] = int(inside[scores.index])
-        similarity[one] = float(scores.similarity[scores.index])
-
-    to_reference = square[np.arange(len(clip_ids)), [reference_of[one] for one in cluster_of.tolist()]]
-    labels = _own_labels(clips, config.label_column)
-    names = name_clusters(cluster_of, labels, [None] * len(labels), to_reference, config.reach)
-    reference_ids = {one: clip_ids[index] for one, index in reference_of.items()}
+        if one in kept:
+            index = clip_ids.index(kept[one])
+            row, frames = earlier[one] | {"clip_id": kept[one]}, earlier_features[one]["feature"]
+        else:
+            poses = [matrix(sequences[clip_ids[i]]["feature"])[:, :POSE_COLUMNS] for i in inside]
+            scores = score_references(poses, weights, distances=weighted[np.ix_(inside, inside)])
+            index = int(inside[scores.index])
+            frames = sequences[clip_ids[index]]["feature"]
+            row = _centre(one, clip_ids[index], digests, len(inside), len(frames), scores)
+        reference[inside] = index
+        rows.append(row)
+        representing.append(_reference_features(one, row["clip_id"], frames))
     return {
-        "clusters": _cluster_rows(clip_ids, cluster_of, names, to_reference, set(reference_of.values())),
-        "references": _reference_rows(reference_ids, cluster_of, names, sequences, similarity),
-        "reference_features": pa.concat_tables(
-            _reference_features(one, sequences[clip_id]) for one, clip_id in reference_ids.items()
-        ),
+        "represented": _represented(members, reference, square),
+        "centres": pa.Table.from_pylist(rows, schema=TABLES["centres"]),
+        "reference_features": pa.concat_tables(representing),
     }
 
 
-def _own_labels(clips: pa.Table, column: str) -> list[str | None]:
-    if column not in clips.column_names:
-        return [None] * len(clips)
-    return [label or None for label in clips[column].to_pylist()]
+def _by_cluster(reference_features: pa.Table) -> dict[int, pa.Table]:
+    return {rows["cluster_id"][0].as_py(): rows for rows in per_clip(reference_features).values()}
 
 
-def _cluster_rows(
-    clip_ids: list[str], cluster_of: NDArray, names: Names, to_reference: NDArray, references: set[int]
-) -> pa.Table:
-    columns = {
-        "clip_id": clip_ids,
-        "cluster_id": pa.array(cluster_of, pa.int32()),
-        "label": pa.array(names.label, pa.string()),
-        "label_source": names.label_source,
-        "confidence": names.confidence,
-        "is_reference": [index in references for index in range(len(clip_ids))],
-        "distance_to_reference": to_reference,
+def _centre(
+    cluster_id: int, clip_id: str, digests: Mapping[str, str], size: int, frames: int, scores: ReferenceScores
+) -> dict:
+    similarity = float(scores.similarity[scores.index])
+    return {
+        "cluster_id": cluster_id,
+        "clip_id": clip_id,
+        "digest": digests[clip_id],
+        "size": size,
+        "frames": frames,
+        "similarity_index": similarity if np.isfinite(similarity) else None,
     }
-    return pa.table(columns, schema=TABLES["clusters"])
 
 
-def _reference_rows(
-    reference_ids: dict[int, str],
-    cluster_of: NDArray,
-    names: Names,
-    sequences: dict[str, pa.Table],
-    similarity: dict[int, float],
-) -> pa.Table:
-    rows = [
-        {
-            "cluster_id": one,
-            "clip_id": clip_id,
-            "label": names.cluster_name[one],
-            "size": int((cluster_of == one).sum()),
-            "frames": len(sequences[clip_id]),
-            "similarity_index": similarity[one] if np.isfinite(similarity[one]) else None,
-        }
-        for one, clip_id in reference_ids.items()
-    ]
-    return pa.Table.from_pylist(rows, schema=TABLES["references"])
-
-
-def _reference_features(cluster_id: int, sequence: pa.Table) -> pa.Table:
+def _represented(members: pa.Table, reference: NDArray[np.intp], square: NDArray) -> pa.Table:
+    clips = np.arange(len(members))
     columns = {
-        "cluster_id": pa.repeat(pa.scalar(cluster_id, pa.int32()), len(sequence)),
-        "clip_id": sequence["clip_id"],
-        "feature": sequence["feature"],
+        "clip_id": members["clip_id"],
+        "cluster_id": members["cluster_id"],
+        "is_reference": clips == reference,
+        "distance_to_reference": square[clips, reference],
+    }
+    return pa.table(columns, schema=TABLES["represented"])
+
+
+def _reference_features(cluster_id: int, clip_id: str, frames: pa.ChunkedArray) -> pa.Table:
+    columns = {
+        "cluster_id": pa.repeat(pa.scalar(cluster_id, pa.int32()), len(frames)),
+        "clip_id": pa.repeat(clip_id, len(frames)),
+        "feature": frames,
     }
     return pa.table(columns, schema=TABLES["reference_features"])

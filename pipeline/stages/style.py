@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import pyarrow as pa
 
@@ -17,9 +17,11 @@ MAKES = ("styles",)
 
 
 def style(
-    clips: pa.Table,
-    clusters: pa.Table,
+    represented: pa.Table,
+    ingested: pa.Table,
     aligned: pa.Table,
+    styles: pa.Table,
+    kept: Mapping[str, str],
     conventions: Sequence[Convention],
     frame_rate: float,
 ) -> dict[str, pa.Table]:
@@ -27,8 +29,14 @@ def style(
 
     Parameters
     ----------
-    clips, clusters, aligned : pyarrow.Table
-        Of the whole library.
+    represented : pyarrow.Table
+        The cluster of every clip of the library, in clip_id order.
+    ingested, aligned : pyarrow.Table
+        Of the clips that are not `kept`, and maybe more.
+    styles : pyarrow.Table
+        What this stage made in the earlier run.
+    kept : mapping of str to str
+        The clips of clusters in which nothing changed, and what they are called there.
     conventions : sequence of Convention
         A user's own joint-name conventions.
     frame_rate : float
@@ -39,17 +47,22 @@ def style(
     dict of str to pyarrow.Table
         `styles`, in the order of the clips.
     """
-    clip_rows = {clip["clip_id"]: clip for clip in clips.to_pylist()}
+    clip_rows = {clip["clip_id"]: clip for clip in ingested.to_pylist()}
+    earlier = {row["clip_id"]: row for row in styles.to_pylist()}
     frames = per_clip(aligned)
     members: dict[int, list[str]] = {}
     reference_of: dict[int, str] = {}
-    for row in clusters.to_pylist():
+    for row in represented.to_pylist():
         members.setdefault(row["cluster_id"], []).append(row["clip_id"])
         if row["is_reference"]:
             reference_of[row["cluster_id"]] = row["clip_id"]
 
     rows: dict[str, dict] = {}
     for cluster_id, clip_ids in members.items():
+        if clip_ids[0] in kept:
+            place = {"cluster_id": cluster_id, "reference_id": reference_of[cluster_id]}
+            rows |= {one: earlier[kept[one]] | {"clip_id": one} | place for one in clip_ids}
+            continue
         motions = {one: read_motion_rows(clip_rows[one], frames[one], frame_rate) for one in clip_ids}
         reference_id = reference_of[cluster_id]
         found = residuals([*motions.values()], motions[reference_id], conventions=conventions)
@@ -58,7 +71,7 @@ def style(
             place = {"clip_id": clip_id, "cluster_id": cluster_id, "reference_id": reference_id}
             explained = space.explained_variance_ratio.tolist()
             rows[clip_id] = place | _energies(one) | {"scores": scores.tolist(), "explained": explained}
-    in_order = [rows[clip_id] for clip_id in clip_rows]
+    in_order = [rows[clip_id] for clip_id in represented["clip_id"].to_pylist()]
     return {"styles": pa.Table.from_pylist(in_order, schema=TABLES["styles"])}
 
 

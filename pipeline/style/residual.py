@@ -17,7 +17,7 @@ import numpy as np
 from motionary.pipeline.alignment.warp import interpolate
 from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention
 from motionary.pipeline.config import FeatureConfig
-from motionary.pipeline.features import FrameFeatures
+from motionary.pipeline.features import POSE_COLUMNS, FrameFeatures
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.style.rig import (
     CANONICAL_REGIONS,
@@ -210,8 +210,8 @@ def _rotation_residual(clip: _Seen, reference: _Seen, conventions: Sequence[Conv
 
 
 def _pose_residual(clip: _Seen, reference: _Seen, _conventions: Sequence[Convention]) -> Residual:
-    columns = slice(0, clip.features.pose_columns)
-    difference = clip.features.values[:, columns].astype(np.float64) - reference.features.values[:, columns]
+    own, other = (one.features.values[:, :POSE_COLUMNS] for one in (clip, reference))
+    difference = own.astype(np.float64) - other
     # The columns are divided by the root of the number of joints; here they are leg lengths again.
     joints = difference.reshape(len(difference), -1, 3) * np.sqrt(len(CANONICAL_JOINTS))
     return Residual("pose", CANONICAL_JOINTS, CANONICAL_REGIONS, joints, _root_residual(clip, reference))

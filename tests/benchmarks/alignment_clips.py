@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motionary.pipeline.alignment import select_reference
 from motionary.pipeline.config import FeatureConfig
-from motionary.pipeline.features import frame_features
+from motionary.pipeline.features import POSE_COLUMNS, frame_features
 from motionary.pipeline.readers import read_motion
 from tests.benchmarks.clips import REAL_CLIPS
 
@@ -53,7 +53,7 @@ def load_classes(most: int | None) -> Classes:
     classes: Classes = {}
     for key, members in paths.items():
         features = [frame_features(read_motion(REAL_DATA / path), config) for path in members[:most]]
-        classes[key] = [one.values[:, : one.pose_columns] for one in features]
+        classes[key] = [one.values[:, :POSE_COLUMNS] for one in features]
     return classes
 
 

@@ -18,6 +18,10 @@ FAILED, QUARANTINED, UNVERIFIED = 1, 3, 4
 CatalogUrl = Annotated[
     str, typer.Argument(metavar="CATALOG", help="Folder of the catalog, or its fsspec URL.")
 ]
+AtSnapshot = Annotated[
+    str | None,
+    typer.Option("--snapshot", help="A snapshot's number or a run's id.", show_default="the published one"),
+]
 OutputFormat = Annotated[
     Literal["table", "json", "csv", "parquet"], typer.Option("--format", help="How to write the answer.")
 ]
@@ -27,11 +31,11 @@ Workers = Annotated[
 Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
 
 
-def open_catalog(url: str) -> Catalog:
-    """Open a catalog's published snapshot."""
+def open_catalog(url: str, snapshot: str | None = None) -> Catalog:
+    """Open a catalog's published snapshot, or an earlier one."""
     from motionary.catalog import Catalog
 
-    return Catalog.open(url)
+    return Catalog.open(url, snapshot)
 
 
 def stderr_console() -> Console:

@@ -21,8 +21,7 @@ from motionary.workflows.commands.options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from motionary.pipeline.config import PipelineConfig
-    from motionary.workflows.main_job import RunResult
+    from motionary.workflows.main_job import Job, RunResult
 
 _COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
 
@@ -35,6 +34,13 @@ def run(
     ] = None,
     labels: Annotated[
         Path | None, typer.Option("--labels", help="CSV of labels: path or clip_id, and any label columns.")
+    ] = None,
+    label_pattern: Annotated[
+        str | None,
+        typer.Option(
+            "--label-pattern",
+            help="Regular expression on clip_ids; named groups are label columns. A value of the CSV wins.",
+        ),
     ] = None,
     label_column: Annotated[
         str | None,
@@ -75,6 +81,9 @@ def run(
     config: Annotated[Path | None, typer.Option("--config", help="Settings of every stage, TOML.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what there is to do, and write nothing.")
+    ] = False,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
     from motionary.workflows.settings import PAPER, load_settings
@@ -94,7 +103,16 @@ def run(
     options["alignment"] = ({"weights": weights} if weights else {}) | (
         {"search": "full"} if full_grid else {}
     )
-    _run([library, *(also or [])], catalog, load_settings(config, options), labels, workers, scheduler)
+    from motionary.workflows.main_job import Job, prepare
+
+    libraries = [str(one) for one in (library, *(also or []))]
+    job = Job(
+        libraries, catalog, load_settings(config, options), labels, label_pattern, _count(workers), scheduler
+    )
+    if dry_run:
+        print(prepare(job).plan)
+    else:
+        _run(job)
 
 
 def demo(
@@ -106,6 +124,7 @@ def demo(
 ) -> None:
     """Run the main job on the embedded library of made-up motions and show the result."""
     from motionary.pipeline.synthetic import write_library
+    from motionary.workflows.main_job import Job
     from motionary.workflows.settings import load_settings
 
     library, catalog = folder / "library", folder / "catalog"
@@ -113,7 +132,8 @@ def demo(
     log.print(f"Writing the embedded library to {library}", highlight=False, soft_wrap=True)
     write_library(library, seed=seed)
     log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
-    _run([library], str(catalog), load_settings(None, {}), library / "labels.csv", workers, None)
+    labels = library / "labels.csv"
+    _run(Job([str(library)], str(catalog), load_settings(None, {}), labels, workers=_count(workers)))
     print(f"\nNext:\n  open {catalog / 'overview.html'} in a browser")
     print(f'  {_program()} query {catalog} "select label, count(*) as clips from clusters group by label"')
     print(f"  {_program()} status {catalog}")
@@ -133,45 +153,42 @@ def graph(
     print(f"wrote {out}")
 
 
-def _run(
-    libraries: list[Path],
-    catalog: str,
-    config: PipelineConfig,
-    labels: Path | None,
-    workers: int | None,
-    scheduler: str | None,
-) -> None:
+def _run(job: Job) -> None:
     from functools import partial
 
-    from dask.system import CPU_COUNT
-
-    from motionary.workflows.main_job import Job, run
+    from motionary.workflows.main_job import run
     from motionary.workflows.progress import progress
     from motionary.workflows.summary import print_summary
     from motionary.workflows.tables import output_console
 
-    job = Job([str(one) for one in libraries], catalog, config, labels, workers or CPU_COUNT, scheduler)
     log = stderr_console()
     try:
         result = run(
             job,
             partial(progress, console=log),
             partial(log.print, _COMPILING, highlight=False),
-            lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
+            take_over=lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
+            planned=lambda plan: log.print(str(plan), highlight=False, soft_wrap=True),
         )
     except KeyboardInterrupt:
         fail("interrupted; the published catalog is as it was, and the same command resumes")
-    _explain(result, labels is not None, log)
+    _explain(result, job, log)
     print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
         raise typer.Exit(QUARANTINED)
 
 
-def _explain(result: RunResult, has_labels: bool, log: Console) -> None:
+def _count(workers: int | None) -> int:
+    from dask.system import CPU_COUNT
+
+    return workers or CPU_COUNT
+
+
+def _explain(result: RunResult, job: Job, log: Console) -> None:
     if result.labels_outside:
         count, first = len(result.labels_outside), result.labels_outside[0]
         log.print(f"passed over {count} labels of files outside the library ({first}, ...)", highlight=False)
-    if not has_labels:
+    if job.labels is None and job.label_pattern is None and not len(result.catalog.labels):
         log.print("clusters have no names without labels: --labels CSV", highlight=False)
     if result.reused:
         total = result.computed + result.reused

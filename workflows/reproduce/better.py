@@ -27,7 +27,7 @@ from scipy.spatial.distance import squareform
 from motionary.catalog import Catalog
 from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.distances import pairwise_distances
-from motionary.pipeline.features import frame_features
+from motionary.pipeline.features import POSE_COLUMNS, frame_features
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.resample import merge_low_motion
 from motionary.workflows.reproduce.combinations import LINKAGES, Condensed, StudiedDistance
@@ -83,13 +83,13 @@ def features_with_velocity(motion: Motion, config: FeatureConfig, tau: float) ->
     -------
     array (frames, d + pose columns) float32, or (frames, d) for tau = 0
     """
-    features = frame_features(motion, config)
-    values, pose = features.values, features.values[:, : features.pose_columns]
+    values = frame_features(motion, config).values
+    pose = values[:, :POSE_COLUMNS]
     if tau:
         still = len(pose) == 1
         velocity = np.zeros_like(pose) if still else np.gradient(pose, axis=0) * config.frame_rate
         values = np.hstack([values, (tau * velocity).astype(np.float32)])
-    return merge_low_motion(values, config.epsilon, config.criterion, driving=features.pose_columns).values
+    return merge_low_motion(values, config.epsilon, config.criterion, driving=POSE_COLUMNS).values
 
 
 def locally_scaled(condensed: Condensed) -> Condensed:

@@ -19,8 +19,9 @@ from functools import partial
 import numpy as np
 
 from motionary.catalog import Catalog
+from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.motion import FloatArray
-from motionary.pipeline.stages.columns import POSE_COLUMNS, matrix, per_clip
+from motionary.pipeline.stages.columns import matrix, per_clip
 from motionary.pipeline.synthetic import synthetic_library
 from motionary.workflows.reproduce.cotw_measures import (
     METHODS,

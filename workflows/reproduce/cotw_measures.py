@@ -29,9 +29,8 @@ from motionary.pipeline.alignment.trajectories import computed_trajectories, rou
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import interpolate
 from motionary.pipeline.config import FeatureConfig
-from motionary.pipeline.features import frame_features, sample_times
+from motionary.pipeline.features import POSE_COLUMNS, frame_features, sample_times
 from motionary.pipeline.motion import FloatArray, Motion
-from motionary.pipeline.stages.columns import POSE_COLUMNS
 from motionary.pipeline.synthetic import TEMPLATE_FPS, SyntheticTake, template
 from motionary.pipeline.tables import table_field
 

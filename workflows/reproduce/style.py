@@ -27,9 +27,8 @@ from motionary.pipeline.alignment import (
     uniform,
 )
 from motionary.pipeline.config import FeatureConfig
-from motionary.pipeline.features import frame_features
+from motionary.pipeline.features import POSE_COLUMNS, frame_features
 from motionary.pipeline.motion import FloatArray
-from motionary.pipeline.stages.columns import POSE_COLUMNS
 from motionary.pipeline.style import residuals, style_accuracy
 from motionary.pipeline.synthetic import ACTIONS, STYLES, SyntheticTake, style_takes
 from motionary.pipeline.tables import table_field

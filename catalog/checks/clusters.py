@@ -1,0 +1,90 @@
+"""Published clusters: their members, references and names."""
+
+from __future__ import annotations
+
+import json
+
+from motionary.catalog.checks.found import Found, has, parts, wrong_rows
+from motionary.catalog.query import Catalog
+
+
+def clusters_hold_every_clip(catalog: Catalog) -> Found:
+    """Every clip is in one published cluster."""
+    wrong = wrong_rows(
+        catalog,
+        "select 'clip ' || clip_id || ' is in ' || count(*) || ' clusters' from clusters group by clip_id "
+        "having count(*) > 1",
+        "select 'clip ' || clip_id || ' is in no cluster' from clips "
+        "where clip_id not in (select clip_id from clusters)",
+        "select clip_id || ' is in a cluster and is no clip' from clusters "
+        "where clip_id not in (select clip_id from clips)",
+    )
+    return Found(f"{len(catalog.clusters)} clips", wrong)
+
+
+def clusters_have_a_reference(catalog: Catalog) -> Found:
+    """Every cluster has one reference, a member, and `references` says the same of it."""
+    wrong = wrong_rows(
+        catalog,
+        """select concat_ws(' ', 'cluster', cluster_id, 'has', count(*) filter (is_reference), 'references')
+           from clusters group by cluster_id having count(*) filter (is_reference) <> 1""",
+        """select concat_ws(' ', 'cluster', cluster_id, 'has', count(*), 'rows of references')
+           from "references" group by cluster_id having count(*) > 1""",
+        """select concat_ws(' ', 'cluster', coalesce(c.cluster_id, r.cluster_id), 'of', coalesce(size, 0),
+                            'clips by references and', coalesce(members, 0), 'by clusters')
+           from (select cluster_id, count(*) as members from clusters group by cluster_id) c
+           full join "references" r using (cluster_id)
+           where coalesce(size, 0) <> coalesce(members, 0)""",
+        """select concat_ws(' ', 'cluster', r.cluster_id, 'has the reference', r.clip_id,
+                            'by references, and', c.clip_id, 'by clusters')
+           from "references" r join clusters c on c.cluster_id = r.cluster_id and c.is_reference
+           where c.clip_id <> r.clip_id""",
+        """select concat_ws(' ', 'reference', clip_id, 'lies', distance_to_reference, 'from itself')
+           from clusters where is_reference and distance_to_reference <> 0""",
+    )
+    return Found(f"{len(catalog.references)} clusters", wrong)
+
+
+def labels_are_consistent(catalog: Catalog) -> Found:
+    """Names come from a person, else from what was supplied, else from the cluster, and say from which."""
+    supplied = f"nullif({_supplied(catalog)}, '')"
+    said = "o.label" if has(catalog, "labels") else "cast(null as varchar)"
+    join = "left join labels o using (clip_id)" if has(catalog, "labels") else ""
+    source = f"""select c.*, {supplied} as supplied, {said} as override, r.label as name
+                 from clusters c left join clips using (clip_id) {join}
+                 left join "references" r using (cluster_id)"""
+    rules = {
+        "label_source not in ('override', 'supplied', 'propagated', 'unassigned')": "of an unknown source",
+        "override is not null and label_source <> 'override'": "while a person said otherwise",
+        "label_source = 'override' and label is distinct from override": "which no person said",
+        "override is null and supplied is not null and label_source <> 'supplied'": "while one was supplied",
+        "label_source = 'supplied' and label is distinct from supplied": "which was not supplied",
+        "label_source = 'propagated' and (label is null or label is distinct from name)":
+            "which its cluster is not called",
+        "label_source = 'unassigned' and label is not null": "though it is unassigned",
+        "not coalesce(case label_source when 'unassigned' then confidence = 0 when 'propagated' "
+        "then confidence > 0 and confidence < 1 else confidence = 1 end, false)":
+            "with a confidence that does not go with it",
+    }  # fmt: skip
+    queries = [
+        f"""select concat_ws(' ', 'clip', clip_id, 'is called', coalesce(label, 'nothing'),
+                             '(' || label_source || ',', confidence || ')', '{problem}')
+            from ({source}) where {rule}"""
+        for rule, problem in rules.items()
+    ]
+    counts = catalog.sql("select label_source, count(*) as clips from clusters group by all order by all")
+    seen = ", ".join(f"{row['clips']} {row['label_source']}" for row in counts.to_pylist())
+    return Found(seen or "no clips", wrong_rows(catalog, *queries))
+
+
+def last_settings(catalog: Catalog) -> dict:
+    """Return the settings of the run that published the snapshot, by stage."""
+    settings = [text for _, rows in parts(catalog, "runs", ["settings"]) for text in rows[0].to_pylist()]
+    return json.loads(settings[-1])
+
+
+def _supplied(catalog: Catalog) -> str:
+    """Name the column of supplied labels in SQL, or nothing where none of that name were supplied."""
+    column = last_settings(catalog)["clusters"]["label_column"]
+    known = catalog.sql("from clips limit 0").column_names
+    return 'clips."' + column.replace('"', '""') + '"' if column in known else "cast(null as varchar)"

@@ -1,0 +1,87 @@
+"""What the published snapshot offers the next run: digests of files, and results to build upon."""
+
+from __future__ import annotations
+
+import json
+import posixpath
+from collections.abc import Mapping, Sequence
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from motionary.catalog.schema import SCHEMAS
+from motionary.catalog.snapshot import Snapshot
+from motionary.catalog.store import Store
+from motionary.pipeline.layout import Earlier, Layout
+from motionary.pipeline.readers.library import FileState, KnownDigest
+from motionary.pipeline.task import MAKES
+
+
+def earlier_run(store: Store, snapshot: Snapshot | None) -> Earlier:
+    """Describe a published run as one to build upon; a motionary that did not list its inputs offers none."""
+    if snapshot is None or "inputs" not in snapshot.tables:
+        return Earlier()
+    inputs = store.read(snapshot.tables["inputs"])
+    quarantine = store.read(snapshot.tables["quarantine"])
+    batches: dict[int, dict[str, str]] = {}
+    for row in inputs.select(["clip_id", "key", "batch"]).to_pylist():
+        batches.setdefault(row["batch"], {})[row["clip_id"]] = row["key"]
+    return Earlier(
+        snapshot_id=snapshot.snapshot_id,
+        batches=[batches[number] for number in sorted(batches)],
+        digests=dict(zip(inputs["clip_id"].to_pylist(), inputs["digest"].to_pylist(), strict=True)),
+        retry=frozenset(quarantine.filter(quarantine["retry"])["path"].to_pylist()),
+        results={stage: _keys(snapshot.tables[makes[0]]) for stage, makes in MAKES.items()},
+        settings=snapshot.stages,
+        batch_size=_batch_size(store, snapshot),
+    )
+
+
+def known_digests(store: Store, snapshot: Snapshot | None) -> KnownDigest:
+    """Return who knows the digests of files that were not touched since the published run."""
+    if snapshot is None or "inputs" not in snapshot.tables:
+        return lambda states: None
+    inputs = store.read(snapshot.tables["inputs"])
+    inputs = inputs.filter(pc.greater(pc.list_value_length(inputs["files"]), 0))
+    known = {
+        tuple(FileState(**state) for state in row["files"]): row["digest"]
+        for row in inputs.select(["files", "digest"]).to_pylist()
+    }
+    return lambda states: known.get(tuple(_storable(state) for state in states))
+
+
+def inputs_table(layout: Layout) -> pa.Table:
+    """List the clips of a run with the state of their files: the table `inputs`."""
+    rows = [
+        {
+            "clip_id": clip.clip_id,
+            "root": _text(clip.source.root),
+            "path": clip.source.path,
+            "files": [vars(_storable(state)) for state in clip.source.states],
+            "digest": clip.source.digest,
+            "key": clip.key,
+            "batch": number,
+        }
+        for number, batch in enumerate(layout.batches)
+        for clip in batch
+    ]
+    return pa.Table.from_pylist(rows, schema=SCHEMAS["inputs"])
+
+
+def _batch_size(store: Store, snapshot: Snapshot) -> int:
+    settings = store.read(snapshot.tables["runs"])["settings"][-1].as_py()
+    return int(json.loads(settings)["distances"]["tile"])
+
+
+def _keys(files: Sequence[str]) -> list[str]:
+    return [posixpath.basename(file).removesuffix(".parquet") for file in files]
+
+
+def _storable(state: FileState) -> FileState:
+    fields: Mapping = vars(state) | {"path": _text(state.path)}
+    return FileState(**fields)
+
+
+def _text(path: str) -> str:
+    """Write a path that is not UTF-8 such that a table can hold it."""
+    return path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

@@ -1,0 +1,496 @@
+"""Verification: a sound catalog passes every check, and each kind of damage fails the check meant for it."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
+import fsspec
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import pytest
+
+from motionary.catalog.schema import SCHEMAS
+from motionary.catalog.store import Store
+from motionary.catalog.verify import _RULES, verify
+
+AS_WRITTEN = "files are as they were written"
+READS = "plain pyarrow reads every file"
+SCHEMA = "files have their tables' schemas"
+SORTED = "clips are unique and sorted"
+ACCOUNTED = "inputs are clips or quarantined"
+PAIRS = "every pair is there once"
+DISTANCES = "distances are distances"
+LINKAGES = "linkages are dendrograms"
+PARTITIONS = "partitions hold every clip once"
+CLUSTERS = "clusters hold every clip once"
+REFERENCES = "clusters have one reference"
+LABELS = "labels are consistent"
+ALIGNED_ONCE = "clips are aligned once"
+ALIGNED = "aligned clips have their reference's frames"
+STYLES = "clips have one style"
+
+
+class Damaged:
+    """A copy of a catalog that can be rewritten such that its manifest agrees with what is there."""
+
+    def __init__(self, url: str, folder: Path) -> None:
+        shutil.copytree(url, folder)
+        self.folder = folder
+        self.store = Store(str(folder))
+        current = (folder / "CURRENT").read_text().strip()
+        self.manifest_file = folder / "snapshots" / f"{current}.json"
+        self.manifest = json.loads(self.manifest_file.read_text())
+
+    def files(self, table: str) -> list[Path]:
+        return [self.folder / name for name in self.manifest["tables"][table]]
+
+    def change(self, table: str, change: Callable[[pa.Table], pa.Table]) -> None:
+        """Write a table anew as one part, and its facts with it."""
+        listed = self.manifest["tables"].get(table, ())
+        rows = self.store.read(listed) if listed else SCHEMAS[table].empty_table()
+        changed = change(rows)
+        name = self.store.part_name(table, "changed")
+        (self.folder / name).parent.mkdir(exist_ok=True)
+        pq.write_table(changed, self.folder / name, compression="zstd")
+        for file in listed:
+            del self.manifest["parts"][file]
+        self.manifest["tables"][table] = [name]
+        self.manifest["parts"][name] = asdict(self.store.facts(name))
+        self.publish()
+
+    def publish(self) -> None:
+        self.manifest_file.write_text(json.dumps(self.manifest))
+
+    def failed(self) -> set[str]:
+        return {check.name for check in verify(str(self.folder)) if not check.passed}
+
+
+@pytest.fixture
+def damaged(demo_catalog, tmp_path) -> Damaged:
+    return Damaged(demo_catalog, tmp_path / "catalog")
+
+
+def put(table: pa.Table, column: str, values: object) -> pa.Table:
+    """Replace a column."""
+    field = table.schema.field(column)
+    return table.set_column(table.schema.get_field_index(column), field, pa.array(values, field.type))
+
+
+def edit(column: str, row: int, value: object) -> Callable[[pa.Table], pa.Table]:
+    """Put another value into one row of a column."""
+
+    def change(table: pa.Table) -> pa.Table:
+        values = table[column].to_pylist()
+        values[row] = value
+        field = table.schema.field(column)
+        changed = pa.array(values, field.type)
+        return table.set_column(table.schema.get_field_index(column), field, changed)
+
+    return change
+
+
+def edit_where(column: str, where: tuple[str, object], value: object) -> Callable[[pa.Table], pa.Table]:
+    """Put another value into the first row that has a value in a column."""
+    return lambda table: edit(column, table[where[0]].to_pylist().index(where[1]), value)(table)
+
+
+def without(row: int) -> Callable[[pa.Table], pa.Table]:
+    return lambda table: table.filter(np.arange(len(table)) != row % len(table))
+
+
+def doubled(row: int) -> Callable[[pa.Table], pa.Table]:
+    return lambda table: table.take([*range(row + 1), row, *range(row + 1, len(table))])
+
+
+def moved_to_end(row: int) -> Callable[[pa.Table], pa.Table]:
+    return lambda table: table.take([*(one for one in range(len(table)) if one != row), row])
+
+
+def swapped(*columns: str) -> Callable[[pa.Table], pa.Table]:
+    """Exchange two columns of the first row."""
+
+    def change(table: pa.Table) -> pa.Table:
+        one, other = (table[column][0].as_py() for column in columns)
+        return edit(columns[1], 0, one)(edit(columns[0], 0, other)(table))
+
+    return change
+
+
+def both(*changes: Callable[[pa.Table], pa.Table]) -> Callable[[pa.Table], pa.Table]:
+    def change(table: pa.Table) -> pa.Table:
+        for one in changes:
+            table = one(table)
+        return table
+
+    return change
+
+
+def stranger(column: str, row: int = 0) -> Callable[[pa.Table], pa.Table]:
+    return edit(column, row, "no/such clip.bvh")
+
+
+def test_a_sound_catalog_passes_every_check(demo_catalog):
+    checks = list(verify(demo_catalog))
+    assert [check for check in checks if not check.passed] == []
+    assert len({check.name for check in checks}) == len(checks)
+    details = {check.name: check.detail for check in checks}
+    assert details[PAIRS] == "3160 pairs of 80 clips"
+    assert details[CLUSTERS] == "80 clips"
+    assert details[LABELS] == "80 supplied"
+
+
+def test_rewriting_a_table_as_it_was_fails_nothing(damaged):
+    for table in damaged.manifest["tables"]:
+        damaged.change(table, lambda rows: rows)
+    assert damaged.failed() == set()
+
+
+def not_a_number(table: pa.Table) -> pa.Table:
+    return edit("weighted", 5, float("nan"))(table)
+
+
+def negative_curve(table: pa.Table) -> pa.Table:
+    curve = table["curve"][0].as_py()
+    low = edit("fuzzy_low", 0, -1.0)(table)
+    return edit("curve", 0, [-1.0, *curve[1:]])(low)
+
+
+def other_reference(table: pa.Table) -> pa.Table:
+    """Give the first clip's alignment the reference of another cluster."""
+    names, first = table["reference_id"].to_pylist(), table["reference_id"][0].as_py()
+    return edit("reference_id", 0, next(name for name in names if name != first))(table)
+
+
+def backwards(table: pa.Table) -> pa.Table:
+    times = table["source_time"][0].as_py()
+    return edit("source_time", 0, [times[1], times[0] - 1, *times[2:]])(table)
+
+
+def stretched(table: pa.Table) -> pa.Table:
+    eta = table["eta"][0].as_py()
+    return edit("eta", 0, [eta[0] + 1, *eta[1:]])(table)
+
+
+def falling(table: pa.Table) -> pa.Table:
+    """Let the second merge of the first linkage lie just under the first one."""
+    return edit("height", 1, float(np.nextafter(table["height"][0].as_py(), -1)))(table)
+
+
+def merged_twice(table: pa.Table) -> pa.Table:
+    return edit("left", 1, table["left"][0].as_py())(table)
+
+
+def later_cluster(table: pa.Table) -> pa.Table:
+    """Let the first merge take what the last one takes, and the other way round."""
+    clips = 1 + table["step"].to_pylist().index(0, 1)
+    one, last = table["left"][0].as_py(), table["left"][clips - 2].as_py()
+    return edit("left", clips - 2, one)(edit("left", 0, last)(table))
+
+
+def second_reference(table: pa.Table) -> pa.Table:
+    row = table["is_reference"].to_pylist().index(False)
+    return edit("distance_to_reference", row, 0.0)(edit("is_reference", row, True)(table))
+
+
+def propagated(table: pa.Table) -> pa.Table:
+    """Say that a label that was supplied came from the cluster."""
+    return both(edit("label_source", 0, "propagated"), edit("confidence", 0, 0.5))(table)
+
+
+def half_as_wide(table: pa.Table) -> pa.Table:
+    place = table.schema.get_field_index("confidence")
+    return table.set_column(place, "confidence", table["confidence"].cast(pa.float32()))
+
+
+def label_column_of_numbers(table: pa.Table) -> pa.Table:
+    return table.append_column("mood", pa.array(range(len(table))))
+
+
+def without_units(table: pa.Table) -> pa.Table:
+    return pa.table(table.to_pydict(), schema=pa.schema([field.remove_metadata() for field in table.schema]))
+
+
+DAMAGE = [
+    ("clusters", half_as_wide, SCHEMA),
+    ("clips", moved_to_end(0), SORTED),
+    ("frames", without(0), "clips have their frames"),
+    ("features", edit("frame", 0, 1), "clips have their features"),
+    ("resampled", lambda rows: rows.filter(pc.not_equal(rows["clip_id"], rows["clip_id"][0])),
+     "clips have their resampled"),
+    ("pairs", without(9), PAIRS),
+    ("pairs", not_a_number, DISTANCES),
+    ("linkage", without(0), LINKAGES),
+    ("partitions", without(0), PARTITIONS),
+    ("clusters", edit_where("distance_to_reference", ("is_reference", True), 0.25), REFERENCES),
+    ("clusters", edit("label", 0, "yawn"), LABELS),
+    ("alignments", doubled(0), ALIGNED_ONCE),
+    ("aligned", without(-1), ALIGNED),
+    ("styles", doubled(0), STYLES),
+    ("inputs", without(0), ACCOUNTED),
+]  # fmt: skip
+
+MORE_DAMAGE = [
+    ("linkage", lambda rows: rows.select(rows.column_names[::-1]), SCHEMA),
+    ("styles", lambda rows: rows.append_column("colour", pa.array(["red"] * len(rows))), SCHEMA),
+    ("clips", label_column_of_numbers, SCHEMA),
+    ("references", without_units, SCHEMA),
+    ("clips", doubled(3), SORTED),
+    ("frames", without(-1), "clips have their frames"),
+    ("frames", doubled(7), "clips have their frames"),
+    ("frames", moved_to_end(0), "clips have their frames"),
+    ("frames", edit("frame", 3, 4), "clips have their frames"),
+    ("features", stranger("clip_id"), "clips have their features"),
+    ("pairs", doubled(9), PAIRS),
+    ("pairs", swapped("clip_a", "clip_b"), PAIRS),
+    ("pairs", stranger("clip_b"), PAIRS),
+    ("pairs", edit("dtw", 3, float("inf")), DISTANCES),
+    ("pairs", edit("b_dtw", 3, -0.5), DISTANCES),
+    ("pairs", edit("b_dtw", 3, 1e6), DISTANCES),
+    ("pairs", negative_curve, DISTANCES),
+    ("pairs", edit("fuzzy_high", 0, 1e6), DISTANCES),
+    ("linkage", falling, LINKAGES),
+    ("linkage", merged_twice, LINKAGES),
+    ("linkage", later_cluster, LINKAGES),
+    ("linkage", edit("size", 0, 3), LINKAGES),
+    ("linkage", edit("height", 0, float("nan")), LINKAGES),
+    ("linkage", lambda rows: rows.filter(pc.not_equal(rows["method"], "fuzzy")), LINKAGES),
+    ("partitions", doubled(0), PARTITIONS),
+    ("partitions", stranger("clip_id"), PARTITIONS),
+    ("partitions", edit("cluster", 0, 99), PARTITIONS),
+    ("clusters", edit_where("is_reference", ("is_reference", True), False), REFERENCES),
+    ("clusters", second_reference, REFERENCES),
+    ("references", edit("size", 0, 1), REFERENCES),
+    ("references", doubled(0), REFERENCES),
+    ("clusters", edit("label", 0, None), LABELS),
+    ("clusters", edit("label_source", 0, "guessed"), LABELS),
+    ("clusters", edit("label_source", 0, "override"), LABELS),
+    ("clusters", edit("confidence", 0, 0.5), LABELS),
+    ("clusters", propagated, LABELS),
+    ("clips", edit("action", 0, "yawn"), LABELS),
+    ("alignments", without(0), ALIGNED_ONCE),
+    ("alignments", stranger("clip_id"), ALIGNED_ONCE),
+    ("alignments", other_reference, ALIGNED_ONCE),
+    ("alignments", edit("cluster_id", 0, 99), ALIGNED_ONCE),
+    ("alignments", edit("source_time", 0, [0.0, 1.0]), ALIGNED_ONCE),
+    ("alignments", backwards, ALIGNED_ONCE),
+    ("alignments", stretched, ALIGNED_ONCE),
+    ("alignments", edit("nodes", 0, [0]), ALIGNED_ONCE),
+    ("aligned", without(0), ALIGNED),
+    ("aligned", stranger("clip_id"), ALIGNED),
+    ("styles", without(0), STYLES),
+    ("styles", edit("cluster_id", 0, 99), STYLES),
+    ("styles", edit("energy", 0, float("nan")), STYLES),
+    ("inputs", doubled(0), ACCOUNTED),
+    ("inputs", edit("digest", 0, "other bytes"), ACCOUNTED),
+    ("inputs", stranger("clip_id"), ACCOUNTED),
+]  # fmt: skip
+
+HARMLESS = [
+    ("references", edit("label", 0, "yawn")),  # all clips have labels of their own
+    ("clips", lambda rows: rows.append_column("mood", pa.array(["glad"] * len(rows)))),
+]
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "check"),
+    [*DAMAGE, *(pytest.param(*one, marks=pytest.mark.slow) for one in MORE_DAMAGE)],
+)
+def test_tables_that_disagree_fail_the_check_meant_for_it(damaged, table, change, check):
+    damaged.change(table, change)
+    assert damaged.failed() == {check}
+
+
+def test_every_check_is_seen_to_fail():
+    of_files = {"the manifest is complete", AS_WRITTEN, READS, CLUSTERS}  # by tests of their own
+    assert {check for _, _, check in DAMAGE} | of_files == {rule.name for rule in _RULES}
+
+
+@pytest.mark.parametrize(("table", "change"), HARMLESS)
+def test_what_is_allowed_fails_nothing(damaged, table, change):
+    damaged.change(table, change)
+    assert damaged.failed() == set()
+
+
+def test_a_clip_in_its_cluster_twice(damaged):
+    clusters = damaged.store.read(damaged.manifest["tables"]["clusters"])
+    member = clusters["is_reference"].to_pylist().index(False)
+    damaged.change("clusters", doubled(member))
+    assert damaged.failed() == {CLUSTERS, REFERENCES}  # whose size no longer agrees
+    one = clusters["cluster_id"][member].as_py()
+    damaged.change(
+        "references",
+        lambda rows: put(rows, "size", [*rows["size"].to_numpy() + (rows["cluster_id"].to_numpy() == one)]),
+    )
+    assert damaged.failed() == {CLUSTERS}
+
+
+@pytest.mark.parametrize(("table", "check"), [("pairs", PAIRS), ("features", "clips have their features")])
+def test_a_part_that_holds_what_another_holds(damaged, table, check):
+    first, again = damaged.manifest["tables"][table][0], damaged.store.part_name(table, "again")
+    shutil.copy(damaged.folder / first, damaged.folder / again)
+    damaged.manifest["tables"][table].append(again)
+    damaged.manifest["parts"][again] = damaged.manifest["parts"][first]
+    damaged.publish()
+    assert damaged.failed() == {check}
+
+
+def test_a_clip_in_no_cluster(damaged):
+    damaged.change("clusters", without(0))
+    assert CLUSTERS in damaged.failed()
+
+
+def test_a_snapshot_of_an_older_motionary_says_that_it_has_no_inputs(damaged):
+    for file in damaged.manifest["tables"].pop("inputs"):
+        del damaged.manifest["parts"][file]
+    damaged.publish()
+    assert damaged.failed() == {"the manifest is complete"}
+    (check,) = (check for check in verify(str(damaged.folder)) if check.name == ACCOUNTED)
+    assert check.detail.endswith("the snapshot has no table inputs to compare them with")
+
+
+def test_a_catalog_that_is_not_on_disk(damaged):
+    memory = fsspec.filesystem("memory")
+    memory.put(f"{damaged.folder}/", f"/{damaged.folder.parent.name}/", recursive=True)
+    checks = list(verify(f"memory://{damaged.folder.parent.name}"))
+    assert [check for check in checks if not check.passed] == []
+    assert len(checks) == len(_RULES) + 1
+
+
+def test_a_clip_that_is_quarantined_as_well(damaged):
+    clip = damaged.store.read(damaged.manifest["tables"]["clips"])["clip_id"][0].as_py()
+    row = {field.name: 0 if pa.types.is_integer(field.type) else "" for field in SCHEMAS["quarantine"]}
+    row |= {"path": clip} | ({"retry": False} if "retry" in row else {})
+    damaged.change("quarantine", lambda _: pa.Table.from_pylist([row], schema=SCHEMAS["quarantine"]))
+    assert damaged.failed() == {ACCOUNTED}
+
+
+def test_a_name_that_a_person_gave(damaged):
+    clip = damaged.store.read(damaged.manifest["tables"]["clips"])["clip_id"][0].as_py()
+    said = {"clip_id": clip, "digest": "", "label": "yawn", "set_at": datetime.now(UTC), "set_by": "ann"}
+    damaged.change("labels", lambda _: pa.Table.from_pylist([said], schema=SCHEMAS["labels"]))
+    assert damaged.failed() == {LABELS}
+    damaged.change("clusters", both(edit("label", 0, "yawn"), edit("label_source", 0, "override")))
+    assert damaged.failed() == set()
+    damaged.change("labels", without(0))
+    assert damaged.failed() == {LABELS}
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "confidence", "sound"),
+    [
+        ("walk", "propagated", 0.5, True),
+        ("run", "propagated", 0.5, False),
+        ("walk", "propagated", 1.0, False),
+        (None, "unassigned", 0.0, True),
+        (None, "unassigned", 0.5, False),
+        ("walk", "unassigned", 0.0, False),
+        ("walk", "supplied", 1.0, False),
+    ],
+)
+def test_a_name_that_was_not_supplied(damaged, name, source, confidence, sound):
+    clusters = damaged.store.read(damaged.manifest["tables"]["clusters"])
+    row = clusters["label"].to_pylist().index("walk")
+    damaged.change("clips", edit("action", row, None))
+    damaged.change(
+        "clusters",
+        both(
+            edit("label", row, name), edit("label_source", row, source), edit("confidence", row, confidence)
+        ),
+    )
+    assert damaged.failed() == (set() if sound else {LABELS})
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("damage", "fails"),
+    [
+        (flip, {AS_WRITTEN}),
+        (lambda file: file.write_bytes(file.read_bytes()[:-9]), {AS_WRITTEN, READS, SCHEMA}),
+        (Path.unlink, {AS_WRITTEN, READS, SCHEMA}),
+        (lambda file: file.write_bytes(b""), {AS_WRITTEN, READS, SCHEMA}),
+    ],
+    ids=["flipped byte", "truncated", "deleted", "empty"],
+)
+def test_a_damaged_file_fails_by_name_and_hides_no_other_check(damaged, damage, fails):
+    file = damaged.files("resampled")[0]
+    damage(file)
+    checks = list(verify(str(damaged.folder)))
+    failed = {check.name for check in checks if not check.passed}
+    # A byte inside a page may still be read as something, or not.
+    assert fails <= failed <= fails | {READS, "clips have their resampled"}
+    assert len(checks) == len(_RULES) + 1
+    assert file.name in next(check.detail for check in checks if check.name == AS_WRITTEN)
+
+
+def test_a_page_that_cannot_be_read_though_its_checksum_agrees(damaged):
+    name = damaged.manifest["tables"]["features"][0]
+    content = bytearray((damaged.folder / name).read_bytes())
+    column = pq.read_metadata(damaged.folder / name).row_group(0).column(0)
+    start = column.dictionary_page_offset or column.data_page_offset
+    content[start : start + 40] = bytes(40)
+    (damaged.folder / name).write_bytes(content)
+    damaged.manifest["parts"][name] = asdict(damaged.store.facts(name))
+    damaged.publish()
+    assert damaged.failed() == {READS, "clips have their features"}
+
+
+def test_a_manifest_that_states_other_rows(damaged):
+    name = damaged.manifest["tables"]["pairs"][0]
+    damaged.manifest["parts"][name]["rows"] += 1
+    damaged.publish()
+    (check,) = (check for check in verify(damaged.store) if not check.passed)
+    assert check.name == AS_WRITTEN
+    assert f"{name} has rows " in check.detail
+
+
+@pytest.mark.parametrize("part", ["parts", "tables"])
+def test_a_manifest_that_lacks_something(damaged, part):
+    if part == "parts":
+        del damaged.manifest["parts"][damaged.manifest["tables"]["cuts"][0]]
+    else:
+        for file in damaged.manifest["tables"].pop("resampled"):
+            del damaged.manifest["parts"][file]
+    damaged.publish()
+    failed = damaged.failed()
+    assert "the manifest is complete" in failed
+    assert failed <= {"the manifest is complete", "clips have their resampled"}
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"tables": {}}'])
+def test_without_a_manifest_that_is_the_only_check(damaged, content):
+    damaged.manifest_file.write_text(content)
+    (check,) = verify(str(damaged.folder))
+    assert (check.name, check.passed) == ("the manifest reads", False)
+    assert "000001" in check.detail
+
+
+def test_the_command_prints_a_line_a_check_and_exits_4_where_one_failed(motionary, damaged):
+    code, out, _ = motionary("verify", damaged.folder)
+    assert code == 0
+    assert len(out.splitlines()) == len(_RULES) + 1
+    assert all(line.startswith("PASSED  ") for line in out.splitlines())
+    damaged.change("pairs", without(9))
+    code, out, _ = motionary("verify", damaged.folder)
+    assert code == 4
+    (line,) = (line for line in out.splitlines() if not line.startswith("PASSED  "))
+    assert line.startswith(f"FAILED  {PAIRS}: 1 of 3160 pairs are missing")
+    code, out, _ = motionary("verify", damaged.folder, "--format", "json")
+    assert code == 4
+    assert [row["check"] for row in json.loads(out) if row["result"] == "FAILED"] == [PAIRS]
+
+
+def test_the_command_on_a_snapshot_that_is_not_there(motionary, damaged):
+    code, out, _ = motionary("verify", damaged.folder, "--snapshot", "7")
+    assert code == 4
+    assert out.startswith("FAILED  the manifest reads: ")
+    assert motionary("verify", damaged.folder, "--snapshot", "000001")[0] == 0

@@ -1,0 +1,97 @@
+"""What a run will do: which clips are new, changed, renamed or gone, and what that costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from motionary.catalog.snapshot import Snapshot
+from motionary.catalog.store import Store
+from motionary.pipeline.graph import LibraryGraph
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What there is to do.
+
+    Parameters
+    ----------
+    new, changed, renamed, removed, unchanged : int
+        Clips, against the published snapshot: of names that were not there, of other bytes under a name, of
+        bytes under another name, of names that are gone, and the others.
+    to_read : int
+        Different contents that have to be read.
+    to_compare : int
+        Pairs that have to be computed.
+    seconds : float, optional
+        About how long that takes, judging by the catalog's last run that computed; None before there is one.
+    """
+
+    new: int
+    changed: int
+    renamed: int
+    removed: int
+    unchanged: int
+    to_read: int
+    to_compare: int
+    seconds: float | None
+
+    def __str__(self) -> str:
+        counts = {
+            "new": self.new, "changed": self.changed, "renamed": self.renamed, "removed": self.removed,
+            "unchanged": self.unchanged,
+        }  # fmt: skip
+        clips = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+        took = "how long is not known before a first run"
+        if self.seconds is not None:
+            took = f"about {self.seconds:.0f} s and what starting takes"
+        return f"clips: {clips}; {self.to_read} to read, {self.to_compare} pairs to compare; {took}"
+
+
+def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers: int) -> Plan:
+    """See what a run would do.
+
+    Parameters
+    ----------
+    graph : LibraryGraph
+        The library and its results.
+    store : Store
+        The catalog.
+    before : Snapshot, optional
+        The published one.
+    workers : int
+        Among which the work is divided.
+    """
+    digests, earlier = graph.layout.digests, graph.earlier.digests
+    names = graph.earlier.names_of(digests)
+    renamed = sum(one not in earlier for one in names)
+    changed = sum(one in earlier and earlier[one] != digest for one, digest in digests.items())
+    to_read, to_compare = graph.contents_to_read(), graph.pairs_to_compare()
+    new = len(digests) - len(names)
+    removed = len(earlier) - len(names)
+    touched = new + changed + removed
+    return Plan(
+        new=new, changed=changed, renamed=renamed, removed=removed,
+        unchanged=len(names) - renamed - changed,
+        to_read=to_read, to_compare=to_compare,
+        seconds=_seconds(store, before, touched, to_read, to_compare, workers),
+    )  # fmt: skip
+
+
+def _seconds(
+    store: Store, before: Snapshot | None, touched: int, to_read: int, to_compare: int, workers: int
+) -> float | None:
+    """Scale the seconds of work that the last run took which read and compared clips."""
+    runs = store.read(before.tables["runs"]).to_pylist() if before else []
+    measured = [run for run in runs if run.get("clips_read") and run["pairs_computed"]]
+    if not measured:
+        return None
+    last, work = measured[-1], dict(measured[-1]["stage_seconds"])
+    clusters = max(last["clusters"], 1)
+    # A clip that comes or goes has the others of its cluster aligned anew, as far as their reference changes.
+    affected = min(touched * last["clips"] / clusters, last["clips"]) / max(last["clips"], 1)
+    total = (
+        work["ingest"] * to_read / last["clips_read"] + work["compare"] * to_compare / last["pairs_computed"]
+    )
+    if touched or to_compare:
+        total += work["cluster"] + (work["represent"] + work["align"] + work["style"]) * affected
+    return total / workers
