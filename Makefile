@@ -7,15 +7,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The peers of the benchmarks: what they pin would drag down what we stand on.
 PEERS := .venv-peers
+# Tests go to a process a core; a file of tests stays together, for what it prepares serves all of it.
+SHARED_OUT := -n auto --dist loadfile
 SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml')
 
-.PHONY: help demo test test-all bench bench-alignment lint clean
+.PHONY: help demo test test-all bench bench-alignment torture lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
 	@echo "make test      run the tests, without those marked slow"
 	@echo "make test-all  run all tests"
 	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment"
+	@echo "make torture   damage files, kill runs, fill disks, read while runs publish; an hour or more"
 	@echo "make lint      check style, types and the direction of imports"
 	@echo "make clean     remove the environments and what the targets made"
 
@@ -25,11 +28,11 @@ demo: $(VENV)/installed
 
 test: $(VENV)/installed
 	@echo "== The tests, without those marked slow"
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest $(SHARED_OUT) -m "not slow"
 
 test-all: $(VENV)/installed
 	@echo "== All tests"
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SHARED_OUT)
 
 bench: $(VENV)/installed $(PEERS)/environment
 	@echo "== The distances beside dtaidistance, aeon and tslearn: some minutes, best on a quiet machine"
@@ -39,6 +42,10 @@ bench: $(VENV)/installed $(PEERS)/environment
 bench-alignment: $(VENV)/installed
 	@echo "== The alignment beside a naive recursion, and on real clips: a minute or two, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks.alignment --json motionary-bench/alignment.json
+
+torture: $(VENV)/installed
+	@echo "== Damaged files, killed runs, readers under writing, full disks: an hour or more"
+	$(BIN)/python -m tests.torture
 
 lint: $(VENV)/installed
 	@echo "== Style, types, direction of imports"

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 
+from motionary.catalog.damage import damaged_file, named_if_damaged
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.leases import Lease
 from motionary.catalog.opening import open_snapshot
@@ -40,7 +42,8 @@ class CatalogTable:
 
     def to_arrow(self) -> pa.Table:
         """Read the table with its units in the field metadata."""
-        return self.store.read(self.files)
+        with named_if_damaged(f"a file of table {self.name} of {self.store.url}"):
+            return self.store.read(self.files)
 
     def to_pandas(self) -> pd.DataFrame:
         """Read the table as a data frame."""
@@ -149,6 +152,11 @@ class Catalog:
     def __repr__(self) -> str:
         return f"<Catalog {self.store.url}: {len(self.clips)} clips, snapshot {self.snapshot.snapshot_id}>"
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings of the run that made the snapshot, by stage."""
+        return json.loads(self.runs.to_arrow()["settings"][-1].as_py())
+
     def files(self, table: str) -> Sequence[str]:
         """List the Parquet files of a table, relative to the catalog.
 
@@ -180,19 +188,23 @@ class Catalog:
         Raises
         ------
         CatalogError
-            The query is not valid; the message is DuckDB's.
+            The query is not valid, with DuckDB's message; or a file of the catalog is damaged.
         """
         import duckdb
 
         with duckdb.connect() as connection:
-            self._create_views(connection)
             try:
+                self._create_views(connection)
                 statements = connection.extract_statements(query)
                 if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
                     raise CatalogError("a catalog is only read: give one statement that selects")
                 return connection.sql(query, params=parameters).to_arrow_table()
-            except duckdb.Error as error:
-                raise CatalogError(f"the query cannot be answered: {error}") from error
+            except (duckdb.Error, UnicodeDecodeError) as error:
+                wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
+                damage = (
+                    None if isinstance(error, wrong) else damaged_file(self.store, self.snapshot, PUBLISHED)
+                )
+                raise CatalogError(damage or f"the query cannot be answered: {error}") from error
 
     def motion(self, clip_id: str) -> Motion:
         """Read a clip's motion as it was captured.
@@ -293,13 +305,14 @@ class Catalog:
 
     def _motion(self, clip: dict, table: str, fps: float) -> Motion:
         filesystem = self.store.filesystem
-        rows = pa.concat_tables(
-            pq.read_table(
-                self.store.path(file), filesystem=filesystem, filters=[("clip_id", "=", clip["clip_id"])]
+        with named_if_damaged(f"a file of table {table} of {self.store.url}"):
+            rows = pa.concat_tables(
+                pq.read_table(
+                    self.store.path(file), filesystem=filesystem, filters=[("clip_id", "=", clip["clip_id"])]
+                )
+                for file in self.files(table)
             )
-            for file in self.files(table)
-        )
-        return read_motion_rows(clip, rows, fps)
+            return read_motion_rows(clip, rows, fps)
 
 
 def nearest(name: str, known: Sequence[str]) -> str:

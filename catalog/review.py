@@ -25,8 +25,6 @@ A clip that a person has labelled is not asked about again, save where the same 
 
 from __future__ import annotations
 
-import json
-
 import pyarrow as pa
 
 from motionary.catalog.query import Catalog
@@ -159,7 +157,7 @@ def review(catalog: Catalog, confidence: float = 0.8, near: float = 0.07) -> pa.
     """
     for table in ("labels", "inputs"):
         catalog.files(table)
-    settings = json.loads(catalog.runs.to_arrow()["settings"][-1].as_py())
+    settings = catalog.settings
     metric = settings["clusters"]["metric"]
     sides = _SIDES.format(metric=metric)
     usual = catalog.sql(_USUAL.format(sides=sides))["distance"][0].as_py()

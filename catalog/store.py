@@ -29,6 +29,7 @@ from fsspec.implementations.local import LocalFileSystem
 
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import conform
+from motionary.pipeline.layout import digest_of_settings
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,18 @@ class Store:
             facts[name] = _facts(content, table.num_rows)
         return facts
 
+    def save_whole(self, name: str, table: pa.Table) -> tuple[str, PartFacts]:
+        """Write a table that is no stage's result as one part, named by its content.
+
+        Returns
+        -------
+        file : str
+            Where it lies inside the catalog.
+        facts : PartFacts
+        """
+        key = digest_of_settings([[str(value) for value in row.values()] for row in table.to_pylist()])
+        return self.part_name(name, key), self.save(key, {name: table})[name]
+
     def facts(self, file: str) -> PartFacts:
         """Read a part that is there and tell what it is known by.
 
@@ -155,17 +168,21 @@ class Store:
             filesystem.makedirs(posixpath.dirname(path), exist_ok=True)
             filesystem.pipe_file(path, content)
             return
-        _make_folder(Path(path).parent)
         temporary = Path(f"{path}.{uuid4().hex}.tmp")
         try:
+            _make_folder(Path(path).parent)
             with temporary.open("wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             temporary.replace(path)
+            _sync_folder(Path(path).parent)
+        except OSError as error:
+            if error.errno is not None and error.filename is None:  # a full disk names no file
+                error.filename = path
+            raise
         finally:
             temporary.unlink(missing_ok=True)
-        _sync_folder(Path(path).parent)
 
     def create(self, name: str, content: bytes) -> None:
         """Write a file that must not be there yet; on disk one writer at a time is presumed.

@@ -82,7 +82,7 @@ def the_only_writer(store: Store, take_over: Callable[[Writer], object]) -> Iter
         if dead := _recorded(record):
             take_over(dead)
         mine = Writer(platform.node(), os.getpid(), datetime.now(UTC).isoformat(timespec="seconds"))
-        record.write_text(json.dumps(asdict(mine)))
+        store.write(RECORD, json.dumps(asdict(mine)).encode())
         yield
     finally:
         # Only a process that dies leaves its record; a fault or an interruption is told where it happens.

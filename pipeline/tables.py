@@ -282,7 +282,7 @@ TABLES: dict[str, pa.Schema] = {
     "labels": pa.schema(
         [
             _CLIP,
-            table_field("digest", pa.string(), "of the clip's bytes when it was labelled"),
+            table_field("digest", pa.string(), "of the clip's bytes when a run last saw it"),
             table_field("label", pa.string(), "what a person calls it"),
             table_field("set_at", pa.timestamp("us", tz="UTC"), "when"),
             table_field("set_by", pa.string(), "who"),

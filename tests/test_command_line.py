@@ -104,7 +104,8 @@ def test_a_mistake_is_one_clear_line(
     assert "Traceback" not in err
     assert out == ""
     if code == 1:
-        assert err.startswith("motionary: ")
+        assert err.splitlines()[-1].startswith("motionary: ")
+        assert all(line.startswith(("motionary: ", "clips: ")) for line in err.splitlines())
 
 
 def test_query_formats(motionary, demo_catalog):
@@ -154,10 +155,11 @@ def test_graph_as_text_and_picture(motionary, tmp_path, demo_library):
     assert code == 0
     lines = (tmp_path / "graph.txt").read_text().splitlines()
     assert lines[0] == "ingest 1"
-    assert "compare 2 <- ingest 1, ingest 2" in lines
+    assert "compare 2 <- resample 1, resample 2" in lines
     assert next(line for line in lines if line.startswith("represent 1 <- ")).endswith(
         "compare 6, ingest 1, ingest 2, ingest 3"
     )
+    assert "name 1 <- cluster 1, represent 1" in lines
     motionary("graph", tmp_path / "graph.svg", "--library", demo_library)
     picture = (tmp_path / "graph.svg").read_text()
     assert picture.startswith("<svg")

@@ -433,15 +433,25 @@ def test_sigterm_ends_a_run_in_order(library, tmp_path):
 
 
 def test_a_second_sigterm_does_not_end_the_tidying_up(library, motionary, tmp_path, monkeypatch):
+    tidied = []
+
     def terminated(*_, **__):
         try:
             os.kill(os.getpid(), signal.SIGTERM)
         finally:
             os.kill(os.getpid(), signal.SIGTERM)
+            tidied.append("the work")
+
+    def announced(*_):
+        os.kill(os.getpid(), signal.SIGTERM)
+        tidied.append("the end")
 
     before = signal.getsignal(signal.SIGTERM)
     monkeypatch.setattr(nightly, "run", terminated)
-    assert motionary("nightly", configuration(tmp_path))[0] == 1
+    monkeypatch.setattr(nightly, "post_report", announced)
+    finish = "[finish]\nwebhook = 'http://127.0.0.1/'"
+    assert motionary("nightly", configuration(tmp_path, finish))[0] == 1
+    assert tidied == ["the work", "the end"]
     assert [line["event"] for line in logged(tmp_path)] == ["started", "failed", "report", "finished"]
     assert the_report(tmp_path)["error"] == "stopped by SIGTERM"
     assert signal.getsignal(signal.SIGTERM) == before

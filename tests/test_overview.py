@@ -26,6 +26,8 @@ from motionary.pipeline.config import AlignmentConfig, ClusterConfig
 from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.stages.align import align
 from motionary.pipeline.stages.cluster import cluster
+from motionary.pipeline.stages.identify import identify
+from motionary.pipeline.stages.name import name as name_them
 from motionary.pipeline.stages.represent import represent
 from motionary.pipeline.stages.style import style
 from motionary.pipeline.synthetic import template
@@ -73,12 +75,18 @@ def make_catalog(folder, demo, clip_ids, labels=NO_LABELS, config=None, quaranti
     ingested = own("clips", "clip_id").select(SCHEMAS["ingested"].names).sort_by("clip_id")
     frames, features = own("frames", "clip_id"), own("features", "clip_id")
     pairs = own("pairs", "clip_a", "clip_b")
-    made = cluster(ingested, pairs, labels, config)
-    made |= represent(made["clips"], made["members"], pairs, features, config, AlignmentConfig())
+    none = {name: schema.empty_table() for name, schema in SCHEMAS.items()}
+    made = none | cluster(ingested, pairs, labels, none["labels"], config)
+    made |= identify(made["groups"], none["members"], none["lineage"], {}, "")
+    made |= represent(
+        made["members"], pairs, ingested, features, none["centres"], none["reference_features"], {},
+        config, AlignmentConfig(),
+    )  # fmt: skip
     made |= align(
-        ingested, frames, features, made["clusters"], made["reference_features"], AlignmentConfig(), 30.0
+        ingested, frames, features, made["represented"], made["reference_features"], AlignmentConfig(), 30.0
     )
-    made |= style(made["clips"], made["clusters"], made["aligned"], (), 30.0)
+    made |= style(made["represented"], ingested, made["aligned"], none["styles"], {}, (), 30.0)
+    made |= name_them(made["clips"], made["represented"], made["centres"], none["labels"], config)
     made |= {"frames": frames, "features": features, "pairs": pairs, "resampled": own("resampled", "clip_id")}
     made["quarantine"] = pa.Table.from_pylist(list(quarantine), schema=SCHEMAS["quarantine"])
     run = demo.runs.to_arrow().to_pylist()[-1]
@@ -132,6 +140,7 @@ def test_page_escapes_every_name(tmp_path, demo, some_ids):
     nasty = {some_ids[0]: NASTY + "1", some_ids[1]: NASTY + "2"}
     labels = pa.table({"clip_id": [NASTY + "1", NASTY + "2"], "action": ["<i>one</i>"] * 2})
     spoiled = [{"path": "<u>a</u>", "line": 3, "reason": "<u>b</u>", "mend": "<u>c</u>"}]
+    spoiled[0] |= {"digest": "", "retry": False}
     folder = tmp_path / "<s>takes&"
     catalog = make_catalog(folder, demo, some_ids, labels, quarantine=spoiled, renamed=nasty)
     html = overview_page(catalog)

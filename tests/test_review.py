@@ -200,6 +200,7 @@ def test_copies_of_a_labelled_file_that_is_gone(line):
     assert listed == [("a", "moved", "trudge", "z"), ("b", "moved", "trudge", "z")]
     clips["a"] = by_person(0, 1, "walk", "x")
     assert asked(line(clips, {"z": ("x", "trudge")}), "clip_id", "reason") == [("b", "moved")]
+    clips["c"] = (4, 1, "walk", "supplied", "")  # bytes that cannot be read are like no others
     assert asked(line(clips, {"z": ("", "trudge")}), "clip_id", "reason") == [("b", "duplicate")]
 
 

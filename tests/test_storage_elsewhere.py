@@ -195,6 +195,29 @@ def test_a_request_that_was_sent_twice_has_not_lost_to_itself(copy, monkeypatch)
     assert current_id(copy) == "000003"
 
 
+def test_the_commands_take_a_url(copy, motionary):
+    assert motionary("query", copy.url, "select count(*) n from clips", "--format", "csv")[1].split() == [
+        '"n"',
+        "5",
+    ]
+    assert motionary("runs", copy.url)[1].count("true") + motionary("runs", copy.url)[1].count("True") >= 2
+    code, out, _ = motionary("vacuum", copy.url, "--grace-hours", 0)
+    assert (code, snapshot_ids(copy)) == (0, ["000002"])
+    assert out.startswith("removed 1 snapshot")
+
+
+def test_a_server_that_cannot_be_reached_is_one_clear_line(motionary, monkeypatch):
+    exceptions = pytest.importorskip("botocore.exceptions")
+
+    def refuse(self, name):
+        raise exceptions.EndpointConnectionError(endpoint_url="http://127.0.0.1:9")
+
+    monkeypatch.setattr(Store, "read_bytes", refuse)
+    code, out, err = motionary("status", "memory://nowhere")
+    assert (code, out) == (1, "")
+    assert err == 'motionary: Could not connect to the endpoint URL: "http://127.0.0.1:9"\n'
+
+
 def meanwhile(monkeypatch, store: Store, step: str, act) -> None:
     """Let something happen just before a step of publishing, once."""
     usual = getattr(Store, step)

@@ -256,10 +256,10 @@ def test_the_command(five, motionary):
     with Catalog.open(five.url, 1):
         code, out, err = motionary("vacuum", five.url, "--keep", 3, "--grace-hours", 0, "--dry-run")
         assert (code, len(snapshot_ids(five))) == (0, 5)
-        assert out.startswith("would remove 1 snapshots (000002) and 0 files of 0.0 MB")
+        assert out.startswith("would remove 1 snapshot (000002) and 0 files of 0.0 MB")
         code, out, err = motionary("vacuum", five.url, "--keep", 3, "--grace-hours", 0)
     assert (code, snapshot_ids(five)) == (0, ["000001", "000003", "000004", "000005"])
-    assert out.startswith("removed 1 snapshots (000002) and 0 files")
+    assert out.startswith("removed 1 snapshot (000002) and 0 files")
     assert "a reader holds 000001" in err
     code, out, err = motionary("vacuum", five.url, "--days", 2.5, "--grace-hours", 0)
     assert out.startswith("removed 2 snapshots (000001, 000003)")

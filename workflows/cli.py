@@ -72,7 +72,8 @@ def main() -> NoReturn:
     except Exception as error:
         from motionary.catalog import CatalogError
 
-        if not isinstance(error, CatalogError):
+        # What keeps s3fs from reaching a server, or from signing in there, is botocore's own.
+        if not isinstance(error, CatalogError) and not type(error).__module__.startswith("botocore."):
             raise
         fail(str(error))
     sys.exit(0)
@@ -90,7 +91,8 @@ _MENDS = {
 
 def _disk_fault(error: OSError) -> str:
     """Say what the disk refused, where, and what to do about it."""
-    if error.strerror is None or error.errno not in _MENDS:
+    mend = _MENDS.get(error.errno or 0)
+    if error.strerror is None or mend is None:
         return str(error)
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror.lower()}; {_MENDS[error.errno]}"
+    return f"{where}{error.strerror.lower()}; {mend}"

@@ -31,7 +31,7 @@ from motionary.catalog.views.overview import overview_page
 from motionary.catalog.writer_lock import Writer, the_only_writer
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
-from motionary.pipeline.layout import digest_of_settings, lay_out
+from motionary.pipeline.layout import lay_out
 from motionary.pipeline.readers.library import KnownDigest, Source, scan_library
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.pipeline.task import MAKES, TaskReport
@@ -41,6 +41,9 @@ from motionary.workflows.labels_file import SuppliedLabels, supplied_labels
 from motionary.workflows.plan import Plan, plan_run
 from motionary.workflows.scheduler import Workers
 from motionary.workflows.versions import versions
+
+_SECONDS_TO_START = 4.0
+"""Seconds that a worker process takes until it works: it imports what this one has imported."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,7 @@ def run(
         planned(ready.plan)
         with (
             show_progress(ready.graph.tasks_by_stage()) as done,
-            Workers(job.workers, job.scheduler, compiling) as workers,
+            Workers(_processes(ready), job.scheduler, compiling) as workers,
         ):
             made = _compute(ready, Computation(ready.store, ready.stored, workers, done))
         catalog = _publish(ready, made, started, check)
@@ -230,6 +233,13 @@ def _claim(store: Store) -> None:
     store.filesystem.makedirs(store.path("tables"), exist_ok=True)
 
 
+def _processes(ready: Prepared) -> int:
+    """Return how many processes to start: none beside this one for what is done before they are up."""
+    workers = ready.job.workers
+    work = None if ready.plan.seconds is None else ready.plan.seconds * workers
+    return 1 if work is not None and work < _SECONDS_TO_START * workers else workers
+
+
 def _compute(ready: Prepared, computation: Computation) -> list[TaskReport]:
     graph, store = ready.graph, ready.store
     represented = ready.before.tables.get("represented") if ready.before else None
@@ -267,9 +277,8 @@ def _publish(
         "runs": pa.concat_tables([runs, record], promote_options="default"),
     }
     for table, rows in own.items():
-        key = digest_of_settings([[str(value) for value in row.values()] for row in rows.to_pylist()])
-        tables[table] = [store.part_name(table, key)]
-        parts[tables[table][0]] = store.save(key, {table: rows})[table]
+        file, parts[file] = store.save_whole(table, rows)
+        tables[table] = [file]
     if before:
         parts = {file: before.parts[file] for file in before.parts} | parts
     listed = {file for files in tables.values() for file in files}

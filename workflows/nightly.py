@@ -137,7 +137,8 @@ def _check(
     for row in report.quarantined:
         log("quarantined", **{name: row[name] for name in ("path", "line", "reason", "mend")})
     changes = diff(before, after) if before is not None else None
-    if changes is not None:
+    if before is not None and changes is not None:
+        report.snapshot_before = before.snapshot.snapshot_id
         report.removed, report.moved = rows(changes.removed), rows(changes.moved)
         report.relabelled = rows(changes.relabelled)
     report.limits = measure(settings.limits, before, after, changes)

@@ -15,7 +15,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from motionary.catalog import Catalog
-from motionary.catalog.checks.clusters import last_settings
 from motionary.catalog.labels import with_labels
 from motionary.catalog.query import nearest
 from motionary.catalog.snapshot import OVERVIEW, next_snapshot_id, publish
@@ -24,7 +23,6 @@ from motionary.catalog.views.overview import overview_page
 from motionary.catalog.writer_lock import Writer, the_only_writer
 from motionary.pipeline.config import ClusterConfig, PipelineConfig
 from motionary.pipeline.graph import naming_task
-from motionary.pipeline.layout import digest_of_settings
 from motionary.pipeline.task import run_task
 from motionary.workflows.computation import StoredParts
 from motionary.workflows.errors import UserError
@@ -106,8 +104,7 @@ def _changed(catalog: Catalog, changes: Mapping[str, str | None], set_by: str) -
 def _publish(current: Catalog, labels: pa.Table) -> None:
     store, before = current.store, current.snapshot
     made = _named(current, labels)
-    key = digest_of_settings([[str(value) for value in row.values()] for row in labels.to_pylist()])
-    made["labels"] = {store.part_name("labels", key): store.save(key, {"labels": labels})["labels"]}
+    made["labels"] = dict([store.save_whole("labels", labels)])
     tables = dict(before.tables) | {table: [*files] for table, files in made.items()}
     facts = dict(before.parts) | {file: known for files in made.values() for file, known in files.items()}
     snapshot = replace(
@@ -124,7 +121,7 @@ def _publish(current: Catalog, labels: pa.Table) -> None:
 def _named(current: Catalog, labels: pa.Table) -> dict[str, dict[str, PartFacts]]:
     """Store what the naming stage makes of these labels; return its files and their facts by table."""
     store = current.store
-    clusters = last_settings(current)["clusters"]
+    clusters = current.settings["clusters"]
     settings = ClusterConfig(label_column=clusters["label_column"], reach=clusters["reach"])
     overrides = labels.filter(pc.is_in(labels["clip_id"], current.inputs.to_arrow()["clip_id"]))
     clustered, represented = (

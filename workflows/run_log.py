@@ -11,7 +11,7 @@
 | quarantined | path, line, reason, mend |
 | limit_exceeded | limit, value, found, of |
 | published | snapshot, run_id, clips, quarantined, clusters |
-| vacuumed | what was deleted |
+| vacuumed | snapshots, files, bytes that are gone, held (snapshots that only a reader keeps) |
 | failed | error, traceback (of a fault that is ours) |
 | report | file |
 | webhook, command | ok, error where it is not |

@@ -8,14 +8,16 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache, partial
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
-
-from distributed import Client, LocalCluster, as_completed, get_worker
 
 from motionary.pipeline.compilation import KernelCacheError, compile_kernels
 from motionary.pipeline.graph import dask_graph
 from motionary.pipeline.task import TableStore, Task, TaskReport
 from motionary.workflows.errors import UserError
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _COMPILING = "motionary-compiling"
 
@@ -75,6 +77,8 @@ class Workers:
         """
         if not tasks:
             return []
+        from distributed import as_completed
+
         if self._client is None:
             self._client = self._open.enter_context(self._start())
             compile_on_every_machine(self._client, self._compiling)
@@ -100,6 +104,8 @@ def compile_on_every_machine(client: Client, compiling: Callable[[], object]) ->
     SchedulerError
         A machine has no folder to keep compiled kernels in.
     """
+    from distributed import as_completed
+
     announce = cache(compiling)
     client.subscribe_topic(_COMPILING, lambda event: announce())
     one_of_each = {urlsplit(address).hostname: address for address in client.nthreads()}
@@ -114,12 +120,16 @@ def compile_on_every_machine(client: Client, compiling: Callable[[], object]) ->
 
 
 def _compile_here() -> None:
+    from distributed import get_worker
+
     worker = get_worker()
     compile_kernels(lambda: worker.log_event(_COMPILING, worker.address))
 
 
 @contextmanager
 def _client(workers: int, address: str | None) -> Iterator[Client]:
+    from distributed import Client, LocalCluster
+
     if address is not None:
         try:
             client = Client(address, timeout=10)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,5 +124,5 @@ def _reference(catalog: Catalog, style: str, onto: str) -> str:
 
 def _conventions(catalog: Catalog) -> tuple[Convention, ...]:
     """Read back the joint-name conventions that the catalog was made with."""
-    settings = json.loads(catalog.runs.to_arrow()["settings"][-1].as_py())
+    settings = catalog.settings
     return tuple(Convention(**one) for one in settings["features"]["conventions"])

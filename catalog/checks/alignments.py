@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from motionary.catalog.checks.clips import count_frames
-from motionary.catalog.checks.clusters import last_settings
 from motionary.catalog.checks.found import Found, wrong_rows
 from motionary.catalog.query import Catalog
 
@@ -23,7 +22,7 @@ def clips_are_aligned(catalog: Catalog) -> Found:
         """select 'clip ' || clip_id || ' has ' || len(eta) || ' stretches between ' || len(nodes) || ' nodes'
            from alignments where len(eta) <> len(nodes) - 1""",
     ]
-    if not last_settings(catalog)["alignment"]["open_ends"]:
+    if not catalog.settings["alignment"]["open_ends"]:
         queries.append(
             "select 'clip ' || clip_id || ' is stretched by ' || list_sum(eta) || ' frames in all' "
             "from alignments where list_sum(eta) <> 0 or first_frame <> 0"

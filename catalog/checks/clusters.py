@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-
-from motionary.catalog.checks.found import Found, has, parts, wrong_rows
+from motionary.catalog.checks.found import Found, has, wrong_rows
 from motionary.catalog.query import Catalog
 
 
@@ -77,14 +75,8 @@ def labels_are_consistent(catalog: Catalog) -> Found:
     return Found(seen or "no clips", wrong_rows(catalog, *queries))
 
 
-def last_settings(catalog: Catalog) -> dict:
-    """Return the settings of the run that published the snapshot, by stage."""
-    settings = [text for _, rows in parts(catalog, "runs", ["settings"]) for text in rows[0].to_pylist()]
-    return json.loads(settings[-1])
-
-
 def _supplied(catalog: Catalog) -> str:
     """Name the column of supplied labels in SQL, or nothing where none of that name were supplied."""
-    column = last_settings(catalog)["clusters"]["label_column"]
+    column = catalog.settings["clusters"]["label_column"]
     known = catalog.sql("from clips limit 0").column_names
     return 'clips."' + column.replace('"', '""') + '"' if column in known else "cast(null as varchar)"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Hashable
 
 import pyarrow as pa
@@ -39,7 +38,7 @@ def cluster_table(catalog: Catalog) -> pa.Table:
 
 
 def _purity_by_cluster(catalog: Catalog) -> dict[Hashable, float]:
-    settings = json.loads(catalog.runs.to_arrow()["settings"][-1].as_py())
+    settings = catalog.settings
     column = settings["clusters"]["label_column"]
     clips = catalog.clips.to_arrow().sort_by("clip_id")
     if column not in clips.column_names or clips[column].null_count == len(clips):

@@ -42,7 +42,7 @@ from motionary.pipeline.readers.text import read_lines, shown, to_count, to_numb
 
 PositionRule = Literal["add", "replace"]
 
-SLOWEST = 1.0
+SLOWEST = 2.0
 """Seconds between two frames at most: a figure that is sampled more rarely is not in motion, and a frame time
 of a million seconds would grow by thirty million times when the motion is brought to the common rate."""
 

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
+from itertools import pairwise
 from pathlib import Path
 
 from motionary.pipeline.readers.amc import find_skeleton, skeletons_in
@@ -109,7 +110,8 @@ def scan_library(
     PermissionError
         A folder may not be listed.
     ValueError
-        No root is given, two have the same name, or there is no clip under any of them.
+        No root is given, two have the same name, there is no clip under any of them, or two files would be
+        one clip.
     """
     given = [roots] if isinstance(roots, str | os.PathLike) else list(roots)
     if not given:
@@ -127,7 +129,14 @@ def scan_library(
     if not sources:
         places = ", ".join(map(str, folders))
         raise ValueError(f"no motion files ({', '.join(FORMATS)}) under {places}; check the path")
-    return sorted(sources, key=lambda source: source.clip_id)
+    sources.sort(key=lambda source: source.clip_id)
+    for one, other in pairwise(sources):
+        if one.clip_id == other.clip_id:
+            raise ValueError(
+                f"two files would be clip {one.clip_id!r}: {one.files[0]!a} and {other.files[0]!a}; "
+                "rename the one whose name is not UTF-8"
+            )
+    return sources
 
 
 def _prefixes(folders: Sequence[Path]) -> list[str]:

@@ -72,15 +72,14 @@ class StyleSpace:
 
     @classmethod
     def _analysed(cls, rows: FloatArray, mean: FloatArray, most: int) -> StyleSpace:
-        from sklearn.decomposition import PCA
-
         if np.mean((rows - mean) ** 2) <= _NO_VARIANCE * np.mean(rows**2):
             return cls(mean, np.zeros((0, rows.shape[1])), np.zeros(0), np.zeros((len(rows), 0)))
-        # "full" is exact and the same each time; "auto" may draw at random.
-        fitted = PCA(n_components=most, svd_solver="full").fit(rows)
-        kept = fitted.explained_variance_ratio_ > _NO_VARIANCE
-        axes = fitted.components_[kept]
-        return cls(mean, axes, fitted.explained_variance_ratio_[kept], (rows - mean) @ axes.T)
+        # Not scikit-learn's PCA, which is this: importing it takes longer than a night's few new clips.
+        _, deviations, axes = np.linalg.svd(rows - mean, full_matrices=False)
+        ratio = (deviations**2 / np.sum(deviations**2))[:most]
+        kept = ratio > _NO_VARIANCE
+        axes = _pointing_forwards(axes[:most][kept])
+        return cls(mean, axes, ratio[kept], (rows - mean) @ axes.T)
 
     def transform(self, vectors: ArrayLike) -> FloatArray:
         """Find where other clips lie.
@@ -106,6 +105,12 @@ class StyleSpace:
                 "take residuals of one kind, rig and number of stretches"
             )
         return (rows - self.mean) @ self.axes.T
+
+
+def _pointing_forwards(axes: FloatArray) -> FloatArray:
+    """Choose of each axis and its opposite the one whose largest value is positive."""
+    largest = np.take_along_axis(axes, np.abs(axes).argmax(axis=1)[:, None], axis=1)
+    return axes * np.sign(largest)
 
 
 def _checked(vectors: ArrayLike) -> FloatArray:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import ReadError, read_motion
+from tests.readers.conftest import SMALL_AMC
 
 
 def about(axis: str, degrees: float) -> np.ndarray:
@@ -168,6 +169,9 @@ def test_which_asf_belongs_to_an_amc(small_asf: str, small_amc: str, write_file)
         ("femur 11 21 31\n", "femur 11 2", 13, "'femur' has 2 values"),
         (":DEGREES", "hello", 3, "stands before the first frame"),
         ("femur 11 21 31\n", "fem", 13, "'fem' is not in the ASF"),
+        (SMALL_AMC, "# nothing\n", 2, "the file has no frames"),
+        (SMALL_AMC, "1\nspine 5\n", 1, "no frame has a line for the root"),
+        ("spine 6", "spine\0 6", 11, "binary"),
     ],
 )
 def test_damaged_amc_names_its_line(pair: Path, small_amc: str, old, new, line, what) -> None:
@@ -192,7 +196,7 @@ def test_damaged_amc_names_its_line(pair: Path, small_amc: str, old, new, line, 
         ("    hip femur\n", "", 23, "'femur' does not hang from the root"),
         ("order TX TY TZ RX RY RZ", "", 12, "the root has no order"),
         ("length 0.45", "length 0", 6, "the unit of length is 0"),
-        (":hierarchy", ":skin", None, "no :hierarchy"),
+        (":hierarchy", ":skin", 56, "no :hierarchy"),
         ("# a comment", "hello", 1, "stands outside every section"),
     ],
 )

@@ -18,6 +18,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -28,6 +29,7 @@ from typing import Any
 import pyarrow as pa
 
 from tests.torture import forked
+from tests.torture.kill import SETTLED
 from tests.torture.world import (
     add_clip,
     contents,
@@ -72,6 +74,7 @@ def full_disk(work: Path, every: int = 1) -> Disk:
     old = forked.call(partial(contents, before))
     for name in spread(embedded)[CLIPS : CLIPS + GAINED]:
         add_clip(embedded, library, name)
+    time.sleep(SETTLED)
     catalog = _copy(before, work / "catalog")
     _must_end_well(run_arguments(library, catalog), log)
     new = forked.call(partial(contents, catalog))
@@ -169,7 +172,7 @@ def _inject(operation: str, number: int, code: int, catalog: Path) -> None:
         return operate
 
     if operation == "fsync":
-        os.fsync = watched(os.fsync, lambda file: os.readlink(f"/proc/self/fd/{file}"))
+        os.fsync = watched(os.fsync, lambda file: str(Path(f"/proc/self/fd/{file}").readlink()))
     elif operation == "replace":
         os.replace = watched(os.replace, lambda source, target: str(target))
     else:

@@ -77,10 +77,11 @@ def start(arguments: list[str], log: Path, before: Callable[[], object] = lambda
     """
     child = os.fork()
     if child:
+        os.setpgid(child, child)  # here as well as there, so that it is so whoever comes first
         return child
     code = 1
     try:
-        os.setsid()
+        os.setpgid(0, 0)
         with log.open("wb") as file:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
@@ -105,7 +106,7 @@ def run_here(arguments: list[str]) -> int:
 
 
 def wait(child: int, seconds: float = _PATIENCE) -> int | None:
-    """Wait for a child's end and return its exit code, below 0 where a signal ended it; None if it goes on."""
+    """Wait for a child's end and return its exit code, below 0 for a signal; None if it goes on."""
     until = time.monotonic() + seconds
     while (left := until - time.monotonic()) > 0:
         done, status = os.waitpid(child, os.WNOHANG)

@@ -3,7 +3,7 @@
 A case is a kind, a seed and a number, and is made again from these. It is one of
 
 - *read*: the file was taken, and what came out is finite;
-- *refused*: by the product's own error, which names the file, the line where the file has lines, and a reason;
+- *refused*: by the product's own error, which names the file, its line where it is a motion, and a reason;
 - a *fault*: any other exception, a message that lacks one of these, more memory than `MEMORY`, more time
   than `SECONDS`, or the death of the process.
 
@@ -52,7 +52,8 @@ class Kind:
     prepare : callable
         Given a folder, makes there what all cases share.
     make : callable
-        Given a random generator, the case's number and the folder of `prepare`, returns the files of a case by name.
+        Given a random generator, the case's number and the folder of `prepare`, returns the case's files by
+        name.
     check : callable
         Given the folder of `prepare` and a folder with the case's files, lets the product at them.
         Raises `Fault` for an answer that is not good enough; what else it raises is a fault as well.

@@ -9,6 +9,9 @@ from pathlib import Path
 from random import Random
 
 from motionary.catalog import Catalog, CatalogError
+from motionary.catalog.query import CatalogTable
+from motionary.catalog.schema import PUBLISHED
+from motionary.catalog.verify import verify
 from motionary.pipeline.readers import scan_library
 from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import supplied_labels
@@ -161,9 +164,9 @@ def _check_catalog(shared: Path, folder: Path) -> Outcome:
     table = changed.parts[1] if changed.suffix == ".parquet" else "clips"
     try:
         opened = Catalog.open(str(catalog))
-        if table in opened.snapshot.tables:
+        if table in PUBLISHED:
             opened.sql(f'select * from "{table}"')
-            opened.store.read(opened.files(table))
+            CatalogTable(table, opened.store, opened.files(table)).to_arrow()
         for clip in opened.clips.to_arrow()["clip_id"].to_pylist()[:1]:
             opened.motion(clip)
             opened.aligned(clip)
@@ -171,6 +174,11 @@ def _check_catalog(shared: Path, folder: Path) -> Outcome:
         if str(catalog) not in str(error):
             raise Fault(f"a refusal does not name the catalog or its file: {str(error)[:2000]!r}") from None
         return "refused"
+    silent = (
+        table in PUBLISHED and (folder / "catalog" / changed).read_bytes() != (whole / changed).read_bytes()
+    )
+    if changed.suffix == ".parquet" and silent and all(check.passed for check in verify(str(catalog))):
+        raise Fault("a damaged part is read, and verify does not find it")
     return "read"
 
 

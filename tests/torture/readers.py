@@ -34,7 +34,7 @@ QUESTIONS = {
     "aligned": "select count(*) from alignments",
     "pairs": "select count(*) from pairs",
     "named": "select count(*) from clusters join clips using (clip_id)",
-    "compared": "select count(distinct clip) from (select clip_a as clip from pairs union select clip_b from pairs)",
+    "compared": "select count(*) from (select clip_a from pairs union select clip_b from pairs)",
     "in_frames": "select count(distinct clip_id) from frames",
     "in_the_last_run": "select clips from runs order by run_id desc limit 1",
 }
@@ -169,7 +169,7 @@ def _ask(opened: Catalog, reading: Reading) -> dict[str, int]:
     expected = {name: clips * (clips - 1) // 2 if name == "pairs" else clips for name in QUESTIONS}
     if answers != expected or len(table) != clips:
         reading.errors.append(
-            f"snapshot {opened.snapshot.snapshot_id} does not agree with itself: {answers}, {len(table)} clips"
+            f"snapshot {opened.snapshot.snapshot_id} disagrees with itself: {answers}, {len(table)} clips"
         )
     return answers
 

@@ -70,8 +70,12 @@ def vacuum(
         done = remove(store, keep, days, grace_hours, dry_run)
     which = f" ({', '.join(done.snapshots)})" if done.snapshots else ""
     print(
-        f"{'would remove' if dry_run else 'removed'} {len(done.snapshots)} snapshots{which} "
-        f"and {done.files} files of {done.bytes / 1e6:.1f} MB"
+        f"{'would remove' if dry_run else 'removed'} {_count(len(done.snapshots), 'snapshot')}{which} "
+        f"and {_count(done.files, 'file')} of {done.bytes / 1e6:.1f} MB"
     )
     if done.held:
         log.print(f"a reader holds {', '.join(done.held)}", highlight=False, soft_wrap=True)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
