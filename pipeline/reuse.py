@@ -115,7 +115,8 @@ def kept_alignments(
     for one in _alignments(represented, layout.keys).values():
         clusters_now.setdefault(one.cluster_id, []).append(one)
 
-    names, whole = {}, {}
+    names: dict[str, tuple[int, str]] = {}
+    whole: dict[str, str] = {}
     for cluster_id, clips in clusters_now.items():
         contents = [(one.key, one.reference_key) for one in clips]
         found = {one.clip_id: then[pair] for one, pair in zip(clips, contents, strict=True) if pair in then}

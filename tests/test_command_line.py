@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shutil
 import subprocess
 import sys
 
@@ -29,9 +30,10 @@ def test_every_command_has_help(motionary, command):
     assert "Usage: motionary" in out
 
 
-def test_run_prints_what_it_found(motionary, demo_library, demo_catalog):
+def test_run_prints_what_it_found(motionary, demo_library, demo_catalog, tmp_path):
+    catalog = shutil.copytree(demo_catalog, tmp_path / "catalog")
     code, out, err = motionary(
-        "run", demo_library, demo_catalog, "--labels", demo_library / "labels.csv", "--workers", 1
+        "run", demo_library, catalog, "--labels", demo_library / "labels.csv", "--workers", 1
     )
     assert code == 0
     for words in (
@@ -45,7 +47,7 @@ def test_run_prints_what_it_found(motionary, demo_library, demo_catalog):
         "Time:",
     ):
         assert words in out
-    assert demo_catalog in out
+    assert str(catalog) in out
     assert "ingest: " in err
     assert "results were there already" in err
     assert "ingest: " not in out

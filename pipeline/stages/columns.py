@@ -66,7 +66,7 @@ def carried_rows(
     dict of str to pyarrow.Table
         A table a clip; a clip that has no rows there is left out.
     """
-    found = {}
+    found: dict[str, pa.Table] = {}
     for tables, names in carried:
         rows = per_clip(tables[table], column)
         found |= {here: renamed(rows[there], here, column) for here, there in names.items() if there in rows}

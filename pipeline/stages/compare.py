@@ -51,7 +51,8 @@ def compare(
         i, j = np.triu_indices(len(one.clip_ids), 1)
         twins = one.place[i[one.place[i] == one.place[j]]]
         for itself in np.unique(twins):
-            _compare(values, *np.array([[itself], [itself]]), one.clips, one.clips, config)
+            alone = np.array([itself])
+            _compare(values, alone, alone, one.clips, one.clips, config)
     else:
         _compute_between(values, known, one.clips, other.clips, config)
         i, j = np.indices((len(one.clip_ids), len(other.clip_ids))).reshape(2, -1)
@@ -84,7 +85,9 @@ class _Side:
 def _distinct(resampled: pa.Table) -> _Side:
     place_of: dict[bytes, int] = {}
     batch = per_clip(resampled)
-    names, clips, place = [], [], []
+    names: list[str] = []
+    clips: list[NDArray] = []
+    place: list[int] = []
     for clip_id, rows in batch.items():
         frames = matrix(rows["feature"])
         place.append(place_of.setdefault(frames.tobytes(), len(names)))

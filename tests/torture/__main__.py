@@ -1,7 +1,7 @@
 """`make torture`: what may happen to a catalog, on purpose and thousands of times.
 
-From the project's root: `python -m tests.torture`, or one part of it: `fuzz`, `kill`, `readers`, `disk`.
-Exits with 1 where anything failed.
+From the project's root: `python -m tests.torture`, or one part of it: `fuzz`, `kill`, `readers`, `disk`,
+`nights`. Exits with 1 where anything failed.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from tests.torture.fuzz import fuzz, print_tallies
 from tests.torture.fuzz_motion import AMC, ASF, BVH
 from tests.torture.fuzz_tables import CATALOG, LABELS, SETTINGS
 from tests.torture.kill import Kills, plan, print_kills, run_kills, set_up
+from tests.torture.nights import nights, print_nights
 from tests.torture.readers import print_readers, readers_under_writing
 
 KINDS = {kind.name: kind for kind in (BVH, ASF, AMC, LABELS, SETTINGS, CATALOG)}
@@ -82,11 +83,16 @@ def _disk(options: argparse.Namespace, work: Path) -> int:
     return len(found.faults)
 
 
+def _nights(options: argparse.Namespace, work: Path) -> int:
+    return print_nights(nights(work))
+
+
 PARTS: dict[str, Callable[[argparse.Namespace, Path], int]] = {
     "fuzz": _fuzz,
     "kill": _kill,
     "readers": _readers,
     "disk": _disk,
+    "nights": _nights,
 }
 
 if __name__ == "__main__":
