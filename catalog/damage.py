@@ -23,7 +23,7 @@ def named_if_damaged(place: str) -> Iterator[None]:
     """
     try:
         yield
-    except FileNotFoundError:
+    except (FileNotFoundError, CatalogError):
         raise
     except (pa.ArrowException, OSError, ValueError, TypeError) as error:
         raise CatalogError(_told(place, str(error))) from error
@@ -46,6 +46,6 @@ def damaged_file(store: Store, snapshot: Snapshot, tables: Iterable[str]) -> str
 def _told(place: str, why: str) -> str:
     why = " ".join(why.split())[:300]
     return (
-        f"{place} is damaged or gone ({why}); `motionary verify` finds what else is; open an earlier "
-        "snapshot, restore the file from a backup, or run into a new folder"
+        f"{place} is damaged or gone ({why}); remove what is left of it and run again, which computes it "
+        "anew, or open an earlier snapshot; `motionary verify` finds what else is damaged"
     )

@@ -133,6 +133,9 @@ def run_history(catalog: Catalog) -> pa.Table:
         run_id, snapshot, kept, and the columns of `runs` but for the settings and the seconds by stage.
     """
     table = catalog.runs.to_arrow().sort_by("started_at").drop_columns(["settings", "stage_seconds"])
+    for name in ("started_at", "finished_at"):
+        seconds = table[name].cast(pa.timestamp("s", tz="UTC"), safe=False)
+        table = table.set_column(table.column_names.index(name), name, seconds)
     # A run's id ends with its snapshot's.
     snapshots = [run_id.rpartition("-")[2] for run_id in table["run_id"].to_pylist()]
     there = set(catalog.snapshots())

@@ -151,10 +151,31 @@ class Store:
         return self.read([self.part_name(table, key)])
 
     def read(self, files: Iterable[str]) -> pa.Table:
-        """Read parts of one table, joined in the order given; a column one part lacks is null there."""
+        """Read parts of one table, joined in the order given; a column one part lacks is null there.
+
+        Raises
+        ------
+        CatalogError
+            A part is damaged; the message names it and says what to do.
+        FileNotFoundError
+            A part is gone.
+        """
         filesystem = self.filesystem
-        tables = [pq.read_table(self.path(file), filesystem=filesystem) for file in files]
-        return pa.concat_tables(tables, promote_options="default")
+        return pa.concat_tables(
+            [self._read_part(file, filesystem) for file in files], promote_options="default"
+        )
+
+    def _read_part(self, file: str, filesystem: Any) -> pa.Table:
+        try:
+            return pq.read_table(self.path(file), filesystem=filesystem)
+        except FileNotFoundError:
+            raise
+        except (pa.ArrowException, OSError) as error:
+            why = " ".join(str(error).split())[:300]
+            raise CatalogError(
+                f"{self.full_path(file)} is damaged ({why}); remove that file and run again, which computes "
+                "it anew, or open an earlier snapshot; `motionary verify` finds what else is damaged"
+            ) from error
 
     def rows(self, files: Iterable[str]) -> int:
         """Count the rows of parts without reading them."""

@@ -16,7 +16,8 @@ from motionary.catalog.store import PartFacts, Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.synthetic import write_library
 from motionary.workflows import cli
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -60,6 +61,8 @@ def silent_progress() -> Callable:
 @pytest.fixture
 def motionary(monkeypatch, capfdbinary):
     """Run a command in this process; returns exit code, stdout and stderr."""
+
+    monkeypatch.delenv("COLUMNS", raising=False)  # what shares the tests out sets it
 
     def call(*arguments: object, binary: bool = False):
         monkeypatch.setattr(sys, "argv", ["motionary", *map(str, arguments)])

@@ -35,7 +35,8 @@ from numba.core import event
 from motionary.pipeline.config import (
     AlignmentConfig, ClusterConfig, DistanceConfig, FeatureConfig, PipelineConfig
 )
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 compiled = []
 
@@ -74,7 +75,8 @@ RUN_AGAIN = """
 import sys
 from contextlib import contextmanager
 from motionary.pipeline.config import PipelineConfig
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 @contextmanager
 def silent(totals):

@@ -20,7 +20,8 @@ from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import read_motion
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 WALK = "walk/walk_tired_alex_01.bvh"
 SUBSTEPS = 4

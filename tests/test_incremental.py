@@ -18,7 +18,8 @@ from motionary.pipeline.config import (
 )
 from motionary.pipeline.readers import library as scanning
 from motionary.pipeline.stages import align, compare, ingest, represent
-from motionary.workflows.main_job import Job, prepare, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job, prepare
 
 
 @pytest.fixture
@@ -287,3 +288,18 @@ def test_a_library_that_grew_ends_like_one_that_came_at_once(
     # Copies of one file stand for a cluster equally well, so the alignments are compared by content.
     for one in ("alignments", "styles"):
         assert len(getattr(grown, one)) == len(getattr(fresh, one)) == len(fresh.clips)
+
+
+def test_labels_of_renamed_files_are_told_with_the_new_names(takes, tmp_path, silent_progress):
+    labels = takes / "labels.csv"
+    files = sorted(path.relative_to(takes).as_posix() for path in takes.rglob("*.bvh"))
+    labels.write_text("path,action\n" + "".join(f"{file},{file.split('/')[0]}\n" for file in files))
+
+    def again():
+        config = PipelineConfig(distances=DistanceConfig(tile=3))
+        return run(Job([str(takes)], str(tmp_path / "labelled"), config, labels), silent_progress)
+
+    assert again().stale_labels == {}
+    (takes / "walk").rename(takes / "gait")
+    stale = again().stale_labels
+    assert stale == {file: file.replace("walk/", "gait/") for file in files if file.startswith("walk/")}

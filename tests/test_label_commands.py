@@ -193,3 +193,11 @@ def test_every_command_has_help_and_takes_the_catalog_first(motionary, command):
     code, out, _ = motionary("label", command, "--help")
     assert code == 0
     assert f"Usage: motionary label {command} [OPTIONS] {{CATALOG}}" in " ".join(out.split())
+
+
+def test_a_path_that_reads_like_a_clip_but_leads_elsewhere_is_refused(label, tmp_path):
+    file = tmp_path / "decisions.csv"
+    file.write_text(f"path,label\n{WALK},trudge\n")  # relative to this folder, where no clip is
+    code, _, said = label("import", file)
+    assert (code, f"has no clip {WALK!r}" in said) == (1, True)
+    assert labels(label) == {}

@@ -14,7 +14,8 @@ from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.writer_lock import the_only_writer
 from motionary.pipeline.config import ClusterConfig, PipelineConfig
 from motionary.workflows.errors import UserError
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
 
 NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)

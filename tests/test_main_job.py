@@ -14,7 +14,8 @@ from motionary.catalog import Catalog
 from motionary.catalog.schema import PUBLISHED
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
 from motionary.pipeline.stages import ingest
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 
 def manifest(catalog: Path | str) -> dict:
@@ -126,7 +127,7 @@ def test_an_interrupted_run_leaves_the_old_catalog_and_the_next_finishes(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("motionary.workflows.main_job.publish", power_cut)
+        patch.setattr("motionary.workflows.publication.publish", power_cut)
         with pytest.raises(KeyboardInterrupt):
             run(job(few, out), silent_progress)
     assert manifest(out) == before

@@ -395,7 +395,7 @@ def test_what_fails_right_after_publishing_finds_the_catalog_new(library, motion
     def terminated(*_):
         os.kill(os.getpid(), signal.SIGTERM)
 
-    monkeypatch.setattr("motionary.workflows.main_job.overview_page", terminated)
+    monkeypatch.setattr("motionary.workflows.publication.overview_page", terminated)
     assert motionary("nightly", configuration(tmp_path))[0] == 1
     report = the_report(tmp_path)
     assert (report["status"], report["snapshot_after"], report["error"]) == (

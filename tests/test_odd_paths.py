@@ -11,7 +11,8 @@ from motionary.catalog import Catalog
 from motionary.catalog.verify import verify
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.readers import ReadError, read_motion, scan_library
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 from tests.torture.world import spread
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="names and links of POSIX")

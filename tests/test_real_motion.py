@@ -19,7 +19,8 @@ from motionary.pipeline.readers import read_motion
 from motionary.pipeline.readers.library import scan_library
 from motionary.pipeline.retrieval import nearest_neighbour_accuracy
 from motionary.pipeline.stages.columns import condensed, condensed_places
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 from motionary.workflows.reproduce.combinations import pairs_among
 from motionary.workflows.reproduce.draws import draw
 

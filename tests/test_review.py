@@ -18,7 +18,8 @@ from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
 from motionary.pipeline.stages.name import name
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
 
 

@@ -14,7 +14,8 @@ from motionary.catalog.snapshot import current_id, current_snapshot, next_snapsh
 from motionary.catalog.store import Store
 from motionary.catalog.vacuum import vacuum
 from motionary.pipeline.config import PipelineConfig
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from motionary.catalog import CatalogError
 from motionary.catalog.store import Store
 from motionary.catalog.writer_lock import RECORD, Writer, the_only_writer
 from motionary.pipeline.config import PipelineConfig
-from motionary.workflows.main_job import Job, run
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 
 HOLD = """
 import sys, time

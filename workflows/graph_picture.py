@@ -18,7 +18,7 @@ from motionary.pipeline.tables import TABLES
 from motionary.pipeline.task import Task
 from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import NO_LABELS
-from motionary.workflows.main_job import library_sources
+from motionary.workflows.preparation import library_sources
 
 _BOX, _GAP, _COLUMN = (150, 26), 10, 250
 _MOST_IN_COLUMN = 40

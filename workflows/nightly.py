@@ -29,9 +29,10 @@ from motionary.pipeline.readers.library import FORMATS
 from motionary.workflows.announce import post_report, run_command
 from motionary.workflows.errors import UserError
 from motionary.workflows.limits import LimitExceeded, measure, refuse_if_exceeded
-from motionary.workflows.main_job import RunResult, absolute, run
+from motionary.workflows.main_job import RunResult, run
 from motionary.workflows.nightly_settings import NightlySettings
 from motionary.workflows.plan import Plan
+from motionary.workflows.preparation import absolute
 from motionary.workflows.run_log import RunLog, logged_stages
 from motionary.workflows.run_report import RunReport, rows
 
@@ -157,6 +158,8 @@ def _planned(log: RunLog, report: RunReport, plan: Plan) -> None:
 def _published(result: RunResult, log: RunLog, report: RunReport) -> None:
     report.status = "published"
     report.exit_code = QUARANTINED if report.quarantined else DONE
+    if result.stale_labels:
+        log("labels_stale", count=len(result.stale_labels), renamed=dict(result.stale_labels))
     if result.labels_outside:
         log("labels_outside", count=len(result.labels_outside), first=result.labels_outside[0])
     log(

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from dask.system import CPU_COUNT
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from motionary.workflows.main_job import Job
+from motionary.workflows.preparation import Job
 from motionary.workflows.settings import (
     EnvironmentSettings,
     SettingsError,

@@ -26,7 +26,7 @@ from motionary.pipeline.graph import naming_task
 from motionary.pipeline.task import run_task
 from motionary.workflows.computation import StoredParts
 from motionary.workflows.errors import UserError
-from motionary.workflows.main_job import absolute
+from motionary.workflows.preparation import absolute
 
 _MOST_TOLD = 5
 
@@ -74,12 +74,21 @@ def relabel(
 def refuse_unknown(names: Sequence[str], known: Sequence[str], where: str) -> None:
     """Refuse clips that are not known, all together, with the names that may have been meant.
 
+    Parameters
+    ----------
+    names : sequence of str
+        What the unknown clips were called; a path may read like the name of a known one.
+    known : sequence of str
+        The clips.
+    where : str
+        What does not have them.
+
     Raises
     ------
     UserError
-        One is not known.
+        There is one.
     """
-    unknown = sorted(set(names) - set(known))
+    unknown = sorted(set(names))
     if not unknown:
         return
     told = []
@@ -93,8 +102,8 @@ def refuse_unknown(names: Sequence[str], known: Sequence[str], where: str) -> No
 def _changed(catalog: Catalog, changes: Mapping[str, str | None], set_by: str) -> pa.Table:
     inputs = catalog.inputs.to_arrow()
     digests = dict(zip(inputs["clip_id"].to_pylist(), inputs["digest"].to_pylist(), strict=True))
-    named = [clip_id for clip_id, label in changes.items() if label is not None]
-    refuse_unknown(named, [*digests], catalog.store.url)
+    unknown = [one for one, label in changes.items() if label is not None and one not in digests]
+    refuse_unknown(unknown, [*digests], catalog.store.url)
     try:
         return with_labels(catalog.labels.to_arrow(), changes, digests, datetime.now(UTC), set_by)
     except ValueError as error:

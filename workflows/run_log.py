@@ -8,6 +8,7 @@
 | planned | new, changed, renamed, removed, unchanged, and what there is to do |
 | stage | stage, tasks, seconds (since the step of the graph began that the stage belongs to) |
 | labels_outside | count, first |
+| labels_stale | count, renamed: names in the labels file of files that have other names now |
 | quarantined | path, line, reason, mend |
 | limit_exceeded | limit, value, found, of |
 | published | snapshot, run_id, clips, quarantined, clusters |

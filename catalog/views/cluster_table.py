@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from motionary.catalog.query import Catalog
 from motionary.pipeline.evaluation import purity
@@ -21,8 +22,8 @@ def cluster_table(catalog: Catalog) -> pa.Table:
     Returns
     -------
     pyarrow.Table
-        cluster_id, label (null: unnamed), size, purity (the commonest supplied label's share of the clips
-        that have one; null where none has) and reference (a clip_id).
+        cluster_id, label (null: unnamed), size, purity (the commonest own label's share of the clips
+        that have one, from a person or supplied; null where none has) and reference (a clip_id).
     """
     references = catalog.references.to_arrow().sort_by([("size", "descending"), ("cluster_id", "ascending")])
     pure = _purity_by_cluster(catalog)
@@ -38,10 +39,9 @@ def cluster_table(catalog: Catalog) -> pa.Table:
 
 
 def _purity_by_cluster(catalog: Catalog) -> dict[Hashable, float]:
-    settings = catalog.settings
-    column = settings["clusters"]["label_column"]
-    clips = catalog.clips.to_arrow().sort_by("clip_id")
-    if column not in clips.column_names or clips[column].null_count == len(clips):
+    clusters = catalog.clusters.to_arrow()
+    own = pc.is_in(clusters["label_source"], pa.array(["override", "supplied"]))
+    labels = pc.if_else(own, clusters["label"], None)
+    if labels.null_count == len(clusters):
         return {}
-    clusters = catalog.clusters.to_arrow().sort_by("clip_id")["cluster_id"].to_pylist()
-    return purity(clusters, clips[column].to_pylist()).by_cluster
+    return purity(clusters["cluster_id"].to_pylist(), labels.to_pylist()).by_cluster

@@ -12,7 +12,7 @@ import typer
 from motionary.workflows.commands.options import fail
 
 if TYPE_CHECKING:
-    from motionary.workflows.main_job import Job
+    from motionary.workflows.preparation import Job
 
 _USAGE = 2
 
@@ -63,8 +63,8 @@ def _plan(job: Job) -> None:
     import json
     from dataclasses import asdict
 
-    from motionary.workflows.main_job import prepare
     from motionary.workflows.nightly import refuse_empty_libraries
+    from motionary.workflows.preparation import prepare
 
     refuse_empty_libraries(job.libraries)
     print(json.dumps(asdict(prepare(job).plan)))

@@ -21,7 +21,8 @@ from motionary.workflows.commands.options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from motionary.workflows.main_job import Job, RunResult
+    from motionary.workflows.main_job import RunResult
+    from motionary.workflows.preparation import Job
 
 _COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
 
@@ -103,7 +104,7 @@ def run(
     options["alignment"] = ({"weights": weights} if weights else {}) | (
         {"search": "full"} if full_grid else {}
     )
-    from motionary.workflows.main_job import Job, prepare
+    from motionary.workflows.preparation import Job, prepare
 
     libraries = [str(one) for one in (library, *(also or []))]
     job = Job(
@@ -124,7 +125,7 @@ def demo(
 ) -> None:
     """Run the main job on the embedded library of made-up motions and show the result."""
     from motionary.pipeline.synthetic import write_library
-    from motionary.workflows.main_job import Job
+    from motionary.workflows.preparation import Job
     from motionary.workflows.settings import load_settings
 
     library, catalog = folder / "library", folder / "catalog"
@@ -185,6 +186,14 @@ def _count(workers: int | None) -> int:
 
 
 def _explain(result: RunResult, job: Job, log: Console) -> None:
+    if result.stale_labels:
+        name, now = next(iter(result.stale_labels.items()))
+        log.print(
+            f"{len(result.stale_labels)} labels are lost: their files were renamed ({name} is now {now}, "
+            f"...); write the new names into {job.labels} and run again",
+            highlight=False,
+            soft_wrap=True,
+        )
     if result.labels_outside:
         count, first = len(result.labels_outside), result.labels_outside[0]
         log.print(f"passed over {count} labels of files outside the library ({first}, ...)", highlight=False)

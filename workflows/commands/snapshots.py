@@ -73,6 +73,8 @@ def vacuum(
         f"{'would remove' if dry_run else 'removed'} {_count(len(done.snapshots), 'snapshot')}{which} "
         f"and {_count(done.files, 'file')} of {done.bytes / 1e6:.1f} MB"
     )
+    if grace_hours and not done.snapshots:
+        log.print(f"what was current less than {grace_hours:g} h ago stays (--grace-hours)", highlight=False)
     if done.held:
         log.print(f"a reader holds {', '.join(done.held)}", highlight=False, soft_wrap=True)
 

@@ -1,0 +1,146 @@
+"""What a run finds before it starts: the library, its labels, what the published snapshot offers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from motionary.catalog.earlier import earlier_run, inputs_table, known_digests
+from motionary.catalog.labels import following
+from motionary.catalog.schema import SCHEMAS
+from motionary.catalog.snapshot import Snapshot, current_snapshot
+from motionary.catalog.store import Store
+from motionary.pipeline.config import PipelineConfig
+from motionary.pipeline.graph import LibraryGraph
+from motionary.pipeline.layout import Earlier, Layout, lay_out
+from motionary.pipeline.readers.library import KnownDigest, Source, scan_library
+from motionary.pipeline.stage_settings import reading_settings
+from motionary.workflows.computation import StoredParts
+from motionary.workflows.errors import UserError
+from motionary.workflows.labels_file import SuppliedLabels, supplied_labels
+from motionary.workflows.plan import Plan, plan_run
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a run is asked to do.
+
+    Parameters
+    ----------
+    libraries : sequence of str
+        Folders of motion capture.
+    catalog : str
+        Folder or fsspec URL of the catalog; made where there is none.
+    config : PipelineConfig
+        Every stage's settings.
+    labels : Path, optional
+        CSV of supplied labels.
+    label_pattern : str, optional
+        Regular expression on clip_ids whose named groups are label columns; a value of the CSV wins.
+    workers : int
+        Processes on this machine.
+    scheduler : str, optional
+        A running Dask scheduler instead.
+    """
+
+    libraries: Sequence[str]
+    catalog: str
+    config: PipelineConfig
+    labels: Path | None = None
+    label_pattern: str | None = None
+    workers: int = 1
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A job with its library listed, and with what the catalog's published snapshot offers it.
+
+    `stale_labels` are names in the labels file of files that were renamed since the published run, with the
+    clip_ids that these have now.
+    """
+
+    job: Job
+    store: Store
+    roots: Sequence[str]
+    supplied: SuppliedLabels
+    stale_labels: Mapping[str, str]
+    before: Snapshot | None
+    labels: pa.Table
+    graph: LibraryGraph
+    plan: Plan
+
+
+def prepare(job: Job) -> Prepared:
+    """List a job's library and see what there is to do, changing nothing.
+
+    Raises
+    ------
+    CatalogError, UserError
+        As `run`.
+    """
+    store = Store(absolute(job.catalog))
+    before = current_snapshot(store)
+    roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
+    sources = library_sources(roots, known_digests(store, before))
+    wanted = job.config.clusters.n_clusters
+    if wanted is not None and wanted > len(sources):
+        raise UserError(f"{wanted} clusters are asked for, and the library holds {len(sources)} clips")
+    supplied = supplied_labels(job.labels, job.label_pattern, sources, job.config.clusters.label_column)
+
+    earlier = earlier_run(store, before)
+    layout = lay_out(sources, reading_settings(job.config), job.config.distances.tile, earlier)
+    said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
+    labels = following(said or SCHEMAS["labels"].empty_table(), inputs_table(layout))
+    overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
+    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, StoredParts(store))
+    plan = plan_run(graph, store, before, job.workers)
+    stale = _stale_labels(job, supplied, _renamed(earlier, layout), store, before)
+    return Prepared(job, store, roots, supplied, stale, before, labels, graph, plan)
+
+
+def _renamed(earlier: Earlier, layout: Layout) -> dict[str, str]:
+    names = earlier.names_of(layout.digests)
+    return {before: now for now, before in names.items() if before != now}
+
+
+def _stale_labels(
+    job: Job, supplied: SuppliedLabels, now: Mapping[str, str], store: Store, before: Snapshot | None
+) -> dict[str, str]:
+    if job.labels is None or before is None or not supplied.outside or not now:
+        return {}
+    then = {
+        os.path.realpath(os.path.join(row["root"], row["path"])): row["clip_id"]  # noqa: PTH118
+        for row in store.read(before.tables["inputs"]).select(["clip_id", "root", "path"]).to_pylist()
+        if row["clip_id"] in now
+    }
+    clip_ids = {
+        name: name if name in now else then.get(os.path.realpath(job.labels.parent / name))
+        for name in supplied.outside
+        if "\0" not in name
+    }
+    return {name: now[one] for name, one in clip_ids.items() if one is not None}
+
+
+def library_sources(roots: Sequence[str], known_digest: KnownDigest = lambda states: None) -> list[Source]:
+    """List the clips of libraries.
+
+    Raises
+    ------
+    UserError
+        A library is missing or holds no clip.
+    """
+    try:
+        return scan_library(roots, known_digest)
+    except (OSError, ValueError) as error:
+        raise UserError(str(error)) from error
+
+
+def absolute(url: str) -> str:
+    """Return a catalog's URL such that workers find it from any folder."""
+    return url if "://" in url else os.path.abspath(url)  # noqa: PTH100 - Path.resolve would follow links
