@@ -159,6 +159,9 @@ def _compute_within(
     values: Values, known: NDArray[np.bool_], clips: Sequence[NDArray], config: DistanceConfig
 ) -> None:
     """Compute the pairs of one batch that are not known; the part above the diagonal counts."""
+    other_way = known.T & ~known
+    for value in values.values():
+        value[other_way] = np.swapaxes(value, 0, 1)[other_way]
     known = known | known.T
     new = np.flatnonzero(~known.any(axis=1))
     old = np.flatnonzero(known.any(axis=1))
