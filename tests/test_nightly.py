@@ -180,14 +180,16 @@ def test_a_limit_is_a_count_or_a_share(limit, quarantined, exceeded):
     assert measured.exceeded == exceeded
 
 
-@pytest.mark.parametrize(("of_which", "limit"), [("max_moved", 3 / 12), ("max_removed", 8 / 20)])
-def test_moved_and_removed_clips_are_shares_of_their_own_kind(of_which, limit):
+@pytest.mark.parametrize(
+    ("of_which", "limit"), [("max_moved", 3 / 12), ("max_removed", 8 / 20), ("max_relabelled", 6 / 12)]
+)
+def test_moved_removed_and_relabelled_clips_are_shares_of_their_own_kind(of_which, limit):
     before, after = SimpleNamespace(clips=range(20)), SimpleNamespace(quarantine=[], clips=range(50))
-    changes = SimpleNamespace(moved=range(3), removed=range(8))
+    changes = SimpleNamespace(moved=range(3), removed=range(8), relabelled=range(6))
     for share, exceeded in ((limit, False), (limit - 0.001, True)):
         measured = measure(Limits(**{of_which: share}), before, after, changes)  # type: ignore[arg-type]
         assert [one.name for one in measured if one.exceeded] == [of_which] * exceeded
-        assert len(measured) == 3
+        assert len(measured) == 4
 
 
 # Runs

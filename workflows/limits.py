@@ -70,6 +70,7 @@ def measure(
         measured += [
             _measured("max_moved", len(changes.moved), earlier - removed, limits.max_moved),
             _measured("max_removed", removed, earlier, limits.max_removed),
+            _measured("max_relabelled", len(changes.relabelled), earlier - removed, limits.max_relabelled),
         ]
     return measured
 

@@ -102,6 +102,7 @@ class Limits(_Table):
     max_quarantined: Limit = None
     max_moved: Limit = None
     max_removed: Limit = 0.5
+    max_relabelled: Limit = None
 
 
 class Finish(_Table):
