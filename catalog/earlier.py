@@ -31,7 +31,7 @@ def earlier_run(store: Store, snapshot: Snapshot | None) -> Earlier:
         batches=[batches[number] for number in sorted(batches)],
         digests=dict(zip(inputs["clip_id"].to_pylist(), inputs["digest"].to_pylist(), strict=True)),
         retry=frozenset(quarantine.filter(quarantine["retry"])["path"].to_pylist()),
-        results={stage: _keys(snapshot.tables[makes[0]]) for stage, makes in MAKES.items()},
+        results={stage: _keys(snapshot.tables.get(makes[0], ())) for stage, makes in MAKES.items()},
         settings=snapshot.stages,
         batch_size=_batch_size(store, snapshot),
     )

@@ -1,13 +1,18 @@
 """What people said clips are: table `labels`, a row a clip.
 
-These labels win over supplied and propagated ones, whatever the clusters become. They belong to a clip's
-name, and go with its bytes where a file is renamed or moved:
+These labels win over supplied and propagated ones, whatever the clusters become. They belong to a motion: to
+the bytes that were labelled, and where those are gone to the clip's name.
 
-- the name is still in the library: the label stays with it, also where the file's bytes have changed;
-- the name is gone, and of the clips without a label exactly one has its bytes: the label is that clip's now;
-- the name is gone, and no such clip or several are there: the row stays under the old name. The file may come
-  back, or a person says which of the copies is meant.
+- The clip has the bytes that were labelled: the label stays with it.
+- The clip is gone or has other bytes, and the labelled bytes are in clips without a label, or with one that
+  itself goes elsewhere: the label goes there. So it follows files that are renamed, moved or swapped, and a
+  new take under an old name gets none.
+- Labels of the same bytes that say the same are given out in the order of names, as far as there are clips.
+  Where they say different things none goes: a person says which is meant.
+- A label that goes nowhere stays under its name. A file that is there was edited in place; one that is gone
+  may come back.
 
+A clip whose bytes cannot be read just now keeps its label, and the label its digest.
 No row is ever dropped but by `label remove`.
 """
 
@@ -78,34 +83,64 @@ def with_labels(
 
 
 def following(labels: pa.Table, inputs: pa.Table) -> pa.Table:
-    """Let labels go with files that were renamed or moved; see the module for the rule.
+    """Let labels go with the bytes that were labelled; see the module for the rule.
 
     Parameters
     ----------
     labels : pyarrow.Table
         Table `labels` of the catalog as it was.
     inputs : pyarrow.Table
-        clip_id and digest of every file that is in the library now; an empty digest is like no other.
+        clip_id and digest of every file that is in the library now; an empty digest means unreadable bytes.
 
     Returns
     -------
     pyarrow.Table
         As many rows, sorted by clip_id; `digest` is that of the bytes now, where the clip is in the library.
     """
-    rows = _by_clip(labels)
+    rows, before = _by_clip(labels), None
     now = dict(zip(inputs["clip_id"].to_pylist(), inputs["digest"].to_pylist(), strict=True))
-    for clip_id, row in rows.items():
-        row["digest"] = now.get(clip_id) or row["digest"]
-    gone, unlabelled = defaultdict(list), defaultdict(list)
-    for clip_id in rows.keys() - now.keys():
-        gone[rows[clip_id]["digest"]].append(clip_id)
-    for clip_id in now.keys() - rows.keys():
-        unlabelled[now[clip_id]].append(clip_id)
-    for digest, names in gone.items():
-        candidates = unlabelled.get(digest, []) if digest else []
-        if len(names) == len(candidates) == 1:
-            rows[candidates[0]] = rows.pop(names[0]) | {"clip_id": candidates[0]}
+    while rows != before:  # again, as files that were edited in place no longer contest the bytes they had
+        rows, before = _once_moved(rows, now), rows
     return _table(rows)
+
+
+def _once_moved(rows: Mapping[str, dict], now: Mapping[str, str]) -> dict[str, dict]:
+    moves = _moves(rows, now)
+    moved = {}
+    for clip_id, row in rows.items():
+        there = moves.get(clip_id, clip_id)
+        moved[there] = row | {"clip_id": there, "digest": now.get(there) or row["digest"]}
+    return moved
+
+
+def _moves(rows: Mapping[str, dict], now: Mapping[str, str]) -> dict[str, str]:
+    """Tell which displaced rows go to which clips."""
+    displaced = {
+        clip_id
+        for clip_id, row in rows.items()
+        if clip_id not in now or now[clip_id] not in ("", row["digest"])
+    }
+    leaving, places = defaultdict(list), defaultdict(list)  # by digest
+    for clip_id in sorted(displaced):
+        leaving[rows[clip_id]["digest"]].append(clip_id)
+    for clip_id in sorted(now):
+        if clip_id not in rows or clip_id in displaced:
+            places[now[clip_id]].append(clip_id)
+    for digest, names in leaving.items():
+        if not digest or len({rows[name]["label"] for name in names}) > 1:
+            places[digest] = []
+
+    staying = [name for digest, names in leaving.items() for name in names[len(places[digest]) :]]
+    for name in staying:  # grows: a row that stays keeps out another, which then stays too
+        digest = now.get(name, "")
+        if name in places[digest]:
+            places[digest].remove(name)
+            staying += leaving[digest][len(places[digest]) :][:1]
+    return {
+        name: place
+        for digest, names in leaving.items()
+        for name, place in zip(names, places[digest], strict=False)
+    }
 
 
 def _by_clip(labels: pa.Table) -> dict[str, dict]:

@@ -3,7 +3,7 @@
 The list is ordered by *urgency*, how likely a clip's name is wrong, from 0 to 1. What it lists, and why:
 
 `moved`
-    A label lies under the name of a file that is gone, and copies of its bytes are there: which is meant? 1.
+    Labels lie under the names of files that are gone, and the clip has their bytes: which is meant? 1.
 `contradiction`
     The same motion, or almost, has another label elsewhere: one of the two is wrong. 1.
 `mislabelled`

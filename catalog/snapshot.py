@@ -13,6 +13,7 @@ import posixpath
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import PUBLISHED, VERSION
@@ -128,7 +129,7 @@ def read_snapshot(store: Store, snapshot_id: str) -> Snapshot:
         manifest = json.loads(content)
         version = int(manifest["schema_version"])
         if version <= VERSION:
-            return _read_manifest(manifest)
+            return _read_manifest(manifest, snapshot_id)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise lost(store, snapshot_id, error) from None
     raise CatalogError(
@@ -227,13 +228,18 @@ def _overtaken(store: Store, by: str) -> CatalogError:
     )
 
 
-def _read_manifest(manifest: dict) -> Snapshot:
+def _read_manifest(manifest: dict, snapshot_id: str) -> Snapshot:
     parts = {str(file): PartFacts(**facts) for file, facts in manifest.get("parts", {}).items()}
     tables = {str(table): [str(file) for file in files] for table, files in manifest["tables"].items()}
     snapshot = Snapshot(**{**manifest, "parts": parts, "tables": tables})
     strange = [file for file in snapshot.files if not _PART.fullmatch(file)]
     if strange:  # a path out of the catalog would let a query read what it names
         raise ValueError(f"{strange[0][:80]!r} is no part's name")
+    if snapshot.snapshot_id != snapshot_id:
+        raise ValueError(f"it is that of snapshot {str(snapshot.snapshot_id)[:40]!r}")
+    if snapshot.after == snapshot_id:
+        raise ValueError("it comes after itself")
+    datetime.fromisoformat(snapshot.created_at)
     return snapshot
 
 

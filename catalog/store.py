@@ -78,6 +78,8 @@ class Store:
         return posixpath.join(self._located()[1], *names)
 
     def _located(self) -> tuple[Any, str]:
+        if "://" not in self.url:  # fsspec would take `::` in a folder's name for a chain of URLs
+            return LocalFileSystem(), LocalFileSystem._strip_protocol(self.url)
         try:
             # Others write there too: a listing that was remembered would hide what they did.
             return fsspec.core.url_to_fs(self.url, use_listings_cache=False)
@@ -131,7 +133,12 @@ class Store:
         facts : PartFacts
         """
         key = digest_of_settings([[str(value) for value in row.values()] for row in table.to_pylist()])
-        return self.part_name(name, key), self.save(key, {name: table})[name]
+        file = self.part_name(name, key)
+        # A snapshot may name it: it is not written again, perhaps by another version of Arrow.
+        with suppress(FileNotFoundError, CatalogError):
+            if self.read([file]).equals(conform(name, table)):
+                return file, self.facts(file)
+        return file, self.save(key, {name: table})[name]
 
     def facts(self, file: str) -> PartFacts:
         """Read a part that is there and tell what it is known by.

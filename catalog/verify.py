@@ -20,10 +20,13 @@ from motionary.catalog.checks.clips import (
     clips_are_accounted_for,
     clips_are_unique_and_sorted,
     clips_have_their_frames,
+    merged_frames_cover_every_frame,
+    the_run_counted_them,
 )
 from motionary.catalog.checks.clusters import (
     clusters_have_a_reference,
     clusters_hold_every_clip,
+    distances_to_references_are_the_pairs,
     labels_are_consistent,
 )
 from motionary.catalog.checks.dendrograms import linkages_are_dendrograms, partitions_hold_every_clip
@@ -78,12 +81,21 @@ _RULES = (
         _Rule(f"clips have their {table}", partial(clips_have_their_frames, table=table), ("clips", table))
         for table in ("frames", "features", "resampled")
     ),
+    _Rule("merged frames cover every frame", merged_frames_cover_every_frame, ("features", "resampled")),
+    _Rule(
+        "the run counted what is there", the_run_counted_them, ("clips", "quarantine", "references", "runs")
+    ),
     _Rule("every pair is there once", pairs_are_there_once, ("clips", "pairs")),
     _Rule("distances are distances", distances_are_sound, ("pairs",)),
     _Rule("linkages are dendrograms", linkages_are_dendrograms, ("clips", "linkage", "cuts")),
     _Rule("partitions hold every clip once", partitions_hold_every_clip, ("clips", "cuts", "partitions")),
     _Rule("clusters hold every clip once", clusters_hold_every_clip, ("clips", "clusters")),
-    _Rule("clusters have one reference", clusters_have_a_reference, ("clusters", "references")),
+    _Rule("clusters have one reference", clusters_have_a_reference, ("clips", "clusters", "references")),
+    _Rule(
+        "distances to references are the pairs'",
+        distances_to_references_are_the_pairs,
+        ("clusters", "references", "pairs", "runs"),
+    ),
     _Rule(
         "labels are consistent", labels_are_consistent, ("clips", "clusters", "references", "labels", "runs")
     ),

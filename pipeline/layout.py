@@ -152,8 +152,7 @@ def lay_out(sources: Sequence[Source], reading: Any, size: int, earlier: Earlier
         if unchanged and source.clip_id not in earlier.retry:
             return earlier.keys[source.clip_id]
         again = earlier.snapshot_id if unchanged else None
-        named = rate_in_name(Path(source.path).stem) if source.format == "asf/amc" else None
-        return digest_of_settings(reading, source.digest, source.format, named, again)
+        return digest_of_settings(reading, source.digest, source.format, _named(source), again)
 
     clips = {source.clip_id: Clip(source, key(source)) for source in sources}
     names = earlier.names_of({source.clip_id: source.digest for source in sources})
@@ -161,6 +160,14 @@ def lay_out(sources: Sequence[Source], reading: Any, size: int, earlier: Earlier
     stored = [sorted(there[one] for one in batch if one in there) for batch in earlier.batches]
     batches = _batches([*clips], stored if earlier.batch_size == size else [], size)
     return Layout([[clips[clip_id] for clip_id in batch] for batch in batches])
+
+
+def _named(source: Source) -> Any:
+    """Return what reading a clip takes from its name and place."""
+    alone = source.format == "asf/amc" and len(source.files) == 1  # the files beside it say why it is refused
+    if alone or not source.digest:
+        return source.clip_id
+    return rate_in_name(Path(source.path).stem) if source.format == "asf/amc" else None
 
 
 def _batches(clip_ids: Sequence[str], stored: Sequence[Sequence[str]], size: int) -> list[list[str]]:

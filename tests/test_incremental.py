@@ -1,5 +1,6 @@
 """A run on a library that changed does what the change asks for, and ends where a fresh run would."""
 
+import os
 import random
 import shutil
 from collections import Counter
@@ -7,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from motionary.catalog import Catalog
+from motionary.catalog import Catalog, CatalogError
 from motionary.catalog.schema import PUBLISHED
+from motionary.catalog.verify import verify
 from motionary.pipeline.config import (
     AlignmentConfig,
     ClusterConfig,
@@ -303,3 +305,81 @@ def test_labels_of_renamed_files_are_told_with_the_new_names(takes, tmp_path, si
     (takes / "walk").rename(takes / "gait")
     stale = again().stale_labels
     assert stale == {file: file.replace("walk/", "gait/") for file in files if file.startswith("walk/")}
+
+
+def flipped(file: Path) -> None:
+    """Change one bit in the middle of a file."""
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("damage", [flipped, lambda file: file.write_bytes(file.read_bytes()[:100])])
+def test_a_damaged_part_of_an_older_snapshot_is_not_built_upon(
+    after_first, tmp_path, silent_progress, takes, damage
+):
+    first = Catalog.open(tmp_path / "out")
+    after_first(features=FeatureConfig(epsilon=0.3))
+    for table in ("resampled", "pairs"):
+        damage(tmp_path / "out" / first.files(table)[0])
+    again = after_first().catalog
+    assert [check.name for check in verify(again.store) if not check.passed] == []
+    fresh = run(job(takes, tmp_path / "fresh"), silent_progress).catalog
+    for table in ("resampled", "pairs"):
+        one, other = (catalog.sql(f"select * from {table} order by all") for catalog in (again, fresh))
+        assert one.equals(other)
+
+
+def test_a_damaged_part_of_the_published_snapshot_is_named(takes, after_first, tmp_path, another):
+    out = tmp_path / "out"
+    damaged = out / Catalog.open(out).files("pairs")[0]
+    damaged.write_bytes(damaged.read_bytes()[:100])
+    shutil.copy(another, takes / "walk")
+    with pytest.raises(CatalogError, match=rf"{damaged} is damaged .* remove that file and run again"):
+        after_first()
+    damaged.unlink()
+    assert len(after_first().catalog.pairs) == 55
+
+
+def test_a_name_decides_nothing_between_equally_good_references(takes, tmp_path, silent_progress):
+    for file in sorted((takes / "walk").iterdir())[2:]:
+        file.unlink()
+    shutil.rmtree(takes / "squat")
+    one = ClusterConfig(n_clusters=1)
+    before = run(job(takes, tmp_path / "out", clusters=one), silent_progress).catalog
+    reference = before.references.to_arrow()["clip_id"][0].as_py()
+    (takes / reference).rename(takes / "zz.bvh")
+    grown = run(job(takes, tmp_path / "out", clusters=one), silent_progress).catalog
+    fresh = run(job(takes, tmp_path / "fresh", clusters=one), silent_progress).catalog
+    assert grown.references.to_arrow().equals(fresh.references.to_arrow())
+    assert grown.references.to_arrow()["clip_id"].to_pylist() == ["zz.bvh"]
+
+
+def test_lost_numbers_are_not_given_again(after_first, tmp_path):
+    (lost,) = Catalog.open(tmp_path / "out").files("lineage")
+    (tmp_path / "out" / lost).unlink()
+    with pytest.raises(CatalogError, match=rf"{lost} is gone, and with it the clusters' numbers; restore it"):
+        after_first()
+
+
+def test_what_a_snapshot_names_is_not_written_again(after_first, tmp_path):
+    (labels,) = Catalog.open(tmp_path / "out").files("labels")
+    before = (tmp_path / "out" / labels).stat()
+    assert after_first().catalog.files("labels") == [labels]
+    after = (tmp_path / "out" / labels).stat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+
+
+def test_files_that_cannot_be_opened_have_their_own_reasons(takes, after_first):
+    (takes / "a_link.bvh").symlink_to(takes / "nowhere.bvh")
+    os.mkfifo(takes / "b_pipe.bvh")
+    reasons = {row["path"]: row["reason"] for row in after_first().catalog.quarantine.to_arrow().to_pylist()}
+    assert len(set(reasons.values())) == 2
+
+
+def test_a_folder_with_colons_is_itself(takes, tmp_path, silent_progress, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    catalog = run(Job([str(takes)], "zz::b", PipelineConfig()), silent_progress).catalog
+    assert (tmp_path / "zz::b" / "CURRENT").exists()
+    assert not (tmp_path / "zz").exists()
+    assert len(catalog.sql("from clips")) == 10

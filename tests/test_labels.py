@@ -86,10 +86,32 @@ def test_nothing_is_ever_lost(before, changes, now):
     after = following(labels, inputs(now))
     assert said(after) == said(labels)
     assert after["clip_id"].to_pylist() == sorted(set(after["clip_id"].to_pylist()))
-    for clip, label in by_clip(labels).items():
-        if clip in now:
-            assert by_clip(after)[clip] == label
+    for row in labels.to_pylist():
+        if row["digest"] == now.get(row["clip_id"]):
+            assert row in after.to_pylist()
+    for row in after.to_pylist():
+        assert row["digest"] == now.get(row["clip_id"]) or now.get(row["clip_id"], "") == ""
     assert following(after, inputs(now)).equals(after)
+
+
+@given(LIBRARIES, CHANGES, LIBRARIES, st.randoms(use_true_random=False))
+def test_the_order_of_rows_does_not_matter(before, changes, now, random):
+    labels, files = labelled(changes, before), [*now.items()]
+    places = [*range(len(labels))]
+    random.shuffle(places)
+    random.shuffle(files)
+    assert following(labels.take(places), inputs(dict(files))).equals(following(labels, inputs(now)))
+
+
+@given(LIBRARIES, CHANGES, LIBRARIES)
+def test_a_label_that_waits_can_go_nowhere_or_is_contested(before, changes, now):
+    # So is what the review lists as moved.
+    after = following(labelled(changes, before), inputs(now)).to_pylist()
+    free = {digest for clip, digest in now.items() if clip not in {row["clip_id"] for row in after}}
+    waiting = [row for row in after if row["clip_id"] not in now and row["digest"]]
+    for row in waiting:
+        said_of_it = {other["label"] for other in waiting if other["digest"] == row["digest"]}
+        assert row["digest"] not in free or len(said_of_it) > 1
 
 
 @given(st.dictionaries(CLIPS, CLIPS, min_size=1), st.permutations(["u", "v", "w", "x", "y", "z"]))
@@ -108,10 +130,66 @@ def test_a_file_edited_in_place_keeps_its_label_and_can_be_renamed_afterwards():
     assert by_clip(following(edited, inputs({"b": "2", "c": "1"}))) == {"b": "walk"}
 
 
-def test_of_several_copies_none_is_chosen_until_a_person_does():
-    labels = following(labelled({"a": "walk"}, {"a": "1"}), inputs({"b": "1", "c": "1"}))
-    assert by_clip(labels) == {"a": "walk"}
-    assert by_clip(following(labels, inputs({"c": "1"}))) == {"c": "walk"}
+@pytest.mark.parametrize(
+    ("said", "before", "now", "expected"),
+    [
+        pytest.param(
+            {"b5": "five"}, {"b5": "1"}, {"b5": "2", "keep/b5": "1"}, {"keep/b5": "five"}, id="a new take"
+        ),
+        pytest.param(
+            {"a": "walk", "b": "run"}, {"a": "1", "b": "2"}, {"a": "2", "b": "1"}, {"a": "run", "b": "walk"},
+            id="swapped",
+        ),
+        pytest.param(
+            {"a": "walk", "b": "run", "c": "jump"}, {"a": "1", "b": "2", "c": "3"},
+            {"a": "3", "b": "1", "c": "2"}, {"a": "jump", "b": "walk", "c": "run"},
+            id="in a circle",
+        ),
+        pytest.param(
+            {"a": "walk", "b": "run"}, {"a": "1", "b": "2"}, {"a": "0", "b": "1", "c": "2"},
+            {"b": "walk", "c": "run"},
+            id="renumbered",
+        ),
+        pytest.param(
+            {"a": "walk", "b": "run", "c": "jump"}, {"a": "1", "b": "2", "c": "3"},
+            {"a": "0", "b": "1", "c": "2"}, {"a": "walk", "b": "run", "c": "jump"},
+            id="renumbered, and the last has nowhere to go",
+        ),
+        pytest.param(
+            {"a": "walk", "b": "run"}, {"a": "1", "b": "2"}, {"a": "0", "b": "1", "d": "1"},
+            {"b": "run", "d": "walk"},
+            id="past a place that does not free up",
+        ),
+        pytest.param(
+            {"a": "walk"}, {"a": "1"}, {"a": "", "b": "1"}, {"a": "walk"}, id="perhaps still there"
+        ),
+    ],
+)  # fmt: skip
+def test_bytes_beat_the_name(said, before, now, expected):
+    assert by_clip(following(labelled(said, before), inputs(now))) == expected
+
+
+@pytest.mark.parametrize(
+    ("now", "expected"),
+    [
+        (["x", "y"], {"x": "walk", "y": "walk"}),
+        (["x"], {"copy": "walk", "x": "walk"}),
+        (["x", "y", "z"], {"x": "walk", "y": "walk"}),
+    ],
+)
+def test_copies_that_are_called_the_same_are_renamed_together(now, expected):
+    labels = labelled({"a": "walk", "copy": "walk"}, {"a": "1", "copy": "1"})
+    assert by_clip(following(labels, inputs(dict.fromkeys(now, "1")))) == expected
+
+
+def test_an_edited_file_does_not_contest_the_bytes_that_it_had():
+    labels = labelled({"a": "walk", "c": "run"}, {"a": "1", "c": "1"})
+    assert by_clip(following(labels, inputs({"a": "2", "b": "1"}))) == {"a": "walk", "b": "run"}
+
+
+def test_of_several_copies_the_first_has_the_label():
+    labels = following(labelled({"a": "walk"}, {"a": "1"}), inputs({"c": "1", "b": "1"}))
+    assert by_clip(labels) == {"b": "walk"}
 
 
 def test_a_copy_that_has_a_label_of_its_own_keeps_it():
@@ -122,6 +200,7 @@ def test_a_copy_that_has_a_label_of_its_own_keeps_it():
 def test_of_two_labels_for_one_copy_neither_is_chosen():
     labels = labelled({"a": "walk", "b": "run"}, {"a": "1", "b": "1"})
     assert by_clip(following(labels, inputs({"c": "1"}))) == {"a": "walk", "b": "run"}
+    assert by_clip(following(labels, inputs({"c": "1", "d": "1"}))) == {"a": "walk", "b": "run"}
 
 
 def test_a_file_that_is_gone_finds_its_label_when_it_comes_back():
@@ -215,6 +294,18 @@ def test_labels_follow_files_through_runs(few, catalog_of):
     last = catalog_of(few, n_clusters=2).catalog
     assert names(last)[f"takes/{edited.name}"] == ("stroll", "override")
     assert {row["set_by"] for row in last.labels.to_arrow().to_pylist()} == {"ada"}
+
+
+def test_a_new_take_under_an_old_name_has_no_label(few, catalog_of):
+    url = catalog_of(few, n_clusters=2).catalog.store.url
+    old, other = sorted((few / "squat").iterdir())[-2:]
+    relabel(url, {f"squat/{old.name}": "kneel"}, "ada")
+    (few / "keep").mkdir()
+    old.rename(few / "keep" / old.name)
+    old.write_bytes(other.read_bytes() + b"\n")
+    later = names(catalog_of(few, n_clusters=2).catalog)
+    assert later[f"keep/{old.name}"] == ("kneel", "override")
+    assert later[f"squat/{old.name}"][1] != "override"
 
 
 def test_a_label_of_a_file_that_is_gone_waits(few, catalog_of):

@@ -19,8 +19,11 @@ from motionary.catalog import Catalog
 from motionary.catalog.store import Store
 from motionary.catalog.writer_lock import the_only_writer
 from motionary.workflows import nightly
+from motionary.workflows.announce import post_report
 from motionary.workflows.limits import measure
 from motionary.workflows.nightly_settings import Limits, load_nightly
+from motionary.workflows.run_log import RunLog
+from motionary.workflows.run_report import RunReport
 from motionary.workflows.settings import SettingsError, load_settings
 
 EXAMPLE = Path(nightly.__file__).with_name("nightly.toml")
@@ -406,6 +409,19 @@ def test_what_fails_right_after_publishing_finds_the_catalog_new(library, motion
     assert report["run_id"] == Catalog.open(str(tmp_path / "catalog")).runs.to_arrow()["run_id"][-1].as_py()
 
 
+@pytest.mark.parametrize("status", ["failed", "published"])
+def test_no_report_takes_the_place_of_another(tmp_path, status):
+    at, written = "2026-01-02T03:04:05.000+00:00", []
+    for config in ("one.toml", "two.toml", "three.toml"):
+        report = RunReport(config, "catalog", [], {}, "20260102T030405Z-000001", status, started_at=at)
+        report.end()
+        written.append(report.write(tmp_path))
+    assert [json.loads(file.read_text())["config"] for file in written] == [
+        "one.toml", "two.toml", "three.toml",
+    ]  # fmt: skip
+    assert sorted(tmp_path.iterdir()) == sorted(written)
+
+
 # SIGTERM
 
 
@@ -463,8 +479,8 @@ def test_a_second_sigterm_does_not_end_the_tidying_up(library, motionary, tmp_pa
 
 
 @contextmanager
-def web_server(status: int | None) -> Iterator[tuple[str, list[dict]]]:
-    """Take POSTs on this machine; no status: never answer."""
+def web_server(status: int | None, slow_bytes: int = 0) -> Iterator[tuple[str, list[dict]]]:
+    """Take POSTs on this machine; no status: never answer. Of slow bytes it sends one each 0.1 s."""
     taken: list[dict] = []
     over = Event()
 
@@ -476,6 +492,11 @@ def web_server(status: int | None) -> Iterator[tuple[str, list[dict]]]:
                 over.wait()
                 return
             self.send_response(status)
+            self.flush_headers()
+            for _ in range(slow_bytes):
+                self.wfile.write(b"a")
+                over.wait(0.1)
+            self.wfile.write(b": b\r\n" if slow_bytes else b"")
             self.end_headers()
 
         def log_message(self, *_):
@@ -506,6 +527,16 @@ def test_the_webhook_takes_the_report_and_decides_nothing(library, motionary, tm
     assert line["ok"] == (status == 200)
     assert ("error" in line) == (status != 200)
     assert "secret" not in (tmp_path / "logs/nightly.jsonl").read_text() + json.dumps(post["report"])
+
+
+def test_a_webhook_that_answers_byte_by_byte_is_given_up(monkeypatch):
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    lines: list[str] = []
+    with web_server(200, slow_bytes=30) as (url, taken):
+        post_report(url, "{}", 0.5, RunLog(lines.append))
+    (line,) = map(json.loads, lines)
+    assert (len(taken), line["event"], line["ok"]) == (1, "webhook", False)
+    assert line["error"] == "no answer within 0.5 s"
 
 
 def test_a_webhook_that_nobody_serves_is_logged(library, motionary, tmp_path, monkeypatch):

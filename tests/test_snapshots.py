@@ -104,7 +104,7 @@ def test_a_damaged_current_is_one_clear_error(store, publish_rows, written):
 
 
 def edited(**fields) -> dict:
-    return {"snapshot_id": "000001", "created_at": "", "tables": {}, "schema_version": 1} | fields
+    return {"snapshot_id": "000001", "created_at": "2026-01-02", "tables": {}, "schema_version": 1} | fields
 
 
 @pytest.mark.parametrize(
@@ -119,6 +119,11 @@ def edited(**fields) -> dict:
         json.dumps(edited(parts={"a": {"rows": 1}})).encode(),
         json.dumps(edited(another=1)).encode(),
         json.dumps(edited(schema_version="new")).encode(),
+        json.dumps(edited(snapshot_id="000002")).encode(),
+        json.dumps(edited(snapshot_id=1)).encode(),
+        json.dumps(edited(created_at="yesterday")).encode(),
+        json.dumps(edited(created_at=20260102)).encode(),
+        json.dumps(edited(after="000001")).encode(),
         json.dumps(edited(tables={"clips": ["../secret.parquet"]})).encode(),
         json.dumps(edited(tables={"clips": ["tables/../../secret.parquet"]})).encode(),
         json.dumps(edited(tables={"clips": ["/etc/secret.parquet"]})).encode(),
@@ -130,6 +135,12 @@ def test_a_damaged_manifest_is_one_clear_error(store, publish_rows, content):
     store.write(manifest_name("000001"), content)
     with pytest.raises(CatalogError, match="manifest of snapshot '000001' .* is missing or damaged"):
         Catalog.open(store.url)
+
+
+def test_the_manifest_that_is_damaged_there_is_whole_otherwise(store, publish_rows):
+    publish_rows(store)
+    store.write(manifest_name("000001"), json.dumps(edited()).encode())
+    assert read_snapshot(store, "000001").tables == {}
 
 
 def test_a_manifest_of_an_earlier_motionary_is_read(store, publish_rows):

@@ -23,12 +23,15 @@ READS = "plain pyarrow reads every file"
 SCHEMA = "files have their tables' schemas"
 SORTED = "clips are unique and sorted"
 ACCOUNTED = "inputs are clips or quarantined"
+MERGED = "merged frames cover every frame"
+COUNTED = "the run counted what is there"
 PAIRS = "every pair is there once"
 DISTANCES = "distances are distances"
 LINKAGES = "linkages are dendrograms"
 PARTITIONS = "partitions hold every clip once"
 CLUSTERS = "clusters hold every clip once"
 REFERENCES = "clusters have one reference"
+TO_REFERENCES = "distances to references are the pairs'"
 LABELS = "labels are consistent"
 ALIGNED_ONCE = "clips are aligned once"
 ALIGNED = "aligned clips have their reference's frames"
@@ -211,6 +214,24 @@ def label_column_of_numbers(table: pa.Table) -> pa.Table:
     return table.append_column("mood", pa.array(range(len(table))))
 
 
+def spoilt(column: str, value: float) -> Callable[[pa.Table], pa.Table]:
+    """Put a value into the middle of the first row's vector."""
+
+    def change(table: pa.Table) -> pa.Table:
+        vector = table[column][0].as_py()
+        vector[len(vector) // 2] = value
+        return edit(column, 0, vector)(table)
+
+    return change
+
+
+def farther(table: pa.Table) -> pa.Table:
+    """Move a clip away from its reference, by the least that float32 can tell."""
+    row = table["is_reference"].to_pylist().index(False)
+    there = np.float32(table["distance_to_reference"][row].as_py())
+    return edit("distance_to_reference", row, float(np.nextafter(there, np.float32(np.inf))))(table)
+
+
 def without_units(table: pa.Table) -> pa.Table:
     return pa.table(table.to_pydict(), schema=pa.schema([field.remove_metadata() for field in table.schema]))
 
@@ -232,6 +253,9 @@ DAMAGE = [
     ("aligned", without(-1), ALIGNED),
     ("styles", doubled(0), STYLES),
     ("inputs", without(0), ACCOUNTED),
+    ("resampled", edit("last_frame", 0, -1), MERGED),
+    ("runs", edit("clips", -1, 79), COUNTED),
+    ("clusters", farther, TO_REFERENCES),
 ]  # fmt: skip
 
 MORE_DAMAGE = [
@@ -288,6 +312,19 @@ MORE_DAMAGE = [
     ("inputs", doubled(0), ACCOUNTED),
     ("inputs", edit("digest", 0, "other bytes"), ACCOUNTED),
     ("inputs", stranger("clip_id"), ACCOUNTED),
+    ("frames", spoilt("rotations", float("nan")), "clips have their frames"),
+    ("frames", spoilt("root_position", float("-inf")), "clips have their frames"),
+    ("features", spoilt("feature", float("inf")), "clips have their features"),
+    ("features", edit("heading", 5, float("nan")), "clips have their features"),
+    ("resampled", spoilt("feature", float("nan")), "clips have their resampled"),
+    ("aligned", spoilt("rotations", float("nan")), ALIGNED),
+    ("resampled", edit("first_frame", 1, 0), MERGED),
+    ("resampled", edit("last_frame", -1, 9999), MERGED),
+    ("runs", edit("quarantined", -1, 1), COUNTED),
+    ("runs", edit("clusters", -1, 1), COUNTED),
+    ("references", edit("digest", 0, "other bytes"), REFERENCES),
+    ("cuts", lambda rows: put(rows, "primary", [False] * len(rows)), PARTITIONS),
+    ("cuts", lambda rows: put(rows, "primary", [True] * len(rows)), PARTITIONS),
 ]  # fmt: skip
 
 HARMLESS = [
@@ -366,7 +403,7 @@ def test_a_clip_that_is_quarantined_as_well(damaged):
     row = {field.name: 0 if pa.types.is_integer(field.type) else "" for field in SCHEMAS["quarantine"]}
     row |= {"path": clip} | ({"retry": False} if "retry" in row else {})
     damaged.change("quarantine", lambda _: pa.Table.from_pylist([row], schema=SCHEMAS["quarantine"]))
-    assert damaged.failed() == {ACCOUNTED}
+    assert damaged.failed() == {ACCOUNTED, COUNTED}
 
 
 def test_a_name_that_a_person_gave(damaged):
@@ -376,7 +413,9 @@ def test_a_name_that_a_person_gave(damaged):
     assert damaged.failed() == {LABELS}
     damaged.change("clusters", both(edit("label", 0, "yawn"), edit("label_source", 0, "override")))
     assert damaged.failed() == set()
-    damaged.change("labels", without(0))
+    damaged.change("labels", doubled(0))
+    assert damaged.failed() == {LABELS}
+    damaged.change("labels", lambda rows: rows.slice(2))
     assert damaged.failed() == {LABELS}
 
 
@@ -427,7 +466,7 @@ def test_a_damaged_file_fails_by_name_and_hides_no_other_check(damaged, damage, 
     checks = list(verify(str(damaged.folder)))
     failed = {check.name for check in checks if not check.passed}
     # A byte inside a page may still be read as something, or not.
-    assert fails <= failed <= fails | {READS, "clips have their resampled"}
+    assert fails <= failed <= fails | {READS, "clips have their resampled", MERGED}
     assert len(checks) == len(_RULES) + 1
     assert file.name in next(check.detail for check in checks if check.name == AS_WRITTEN)
 
@@ -441,7 +480,7 @@ def test_a_page_that_cannot_be_read_though_its_checksum_agrees(damaged):
     (damaged.folder / name).write_bytes(content)
     damaged.manifest["parts"][name] = asdict(damaged.store.facts(name))
     damaged.publish()
-    assert damaged.failed() == {READS, "clips have their features"}
+    assert damaged.failed() == {READS, "clips have their features", MERGED}
 
 
 def test_a_manifest_that_states_other_rows(damaged):
@@ -463,7 +502,7 @@ def test_a_manifest_that_lacks_something(damaged, part):
     damaged.publish()
     failed = damaged.failed()
     assert "the manifest is complete" in failed
-    assert failed <= {"the manifest is complete", "clips have their resampled"}
+    assert failed <= {"the manifest is complete", "clips have their resampled", MERGED}
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"tables": {}}'])

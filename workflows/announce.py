@@ -11,6 +11,9 @@ import urllib.request
 from collections.abc import Sequence
 from http.client import HTTPException
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import Any
 from urllib.parse import urlsplit
 
 from motionary.workflows.run_log import RunLog
@@ -31,18 +34,18 @@ def post_report(url: str, report: str, timeout: float, log: RunLog) -> None:
     report : str
         JSON.
     timeout : float
-        Seconds that connecting, sending and the answer may each take.
+        Seconds that all of it may take, from looking the host up to the end of the answer's head.
     log : RunLog
         Takes the event `webhook`.
     """
-    host = urlsplit(url).hostname
-    headers = {"Content-Type": "application/json", "User-Agent": "motionary"}
+    became: SimpleQueue[dict[str, Any]] = SimpleQueue()
+    # A socket's timeout is for each read: a server that drips bytes would hold the job for ever.
+    Thread(target=lambda: became.put(_posted(url, report, timeout)), daemon=True).start()
     try:
-        request = urllib.request.Request(url, report.encode(), headers, method="POST")
-        with urllib.request.urlopen(request, timeout=timeout) as answer:
-            log("webhook", ok=True, host=host, answer=answer.status)
-    except (OSError, HTTPException, ValueError) as error:  # ValueError: an address with a port that is none
-        log("webhook", ok=False, host=host, error=str(error) or type(error).__name__)
+        fields = became.get(timeout=timeout)
+    except Empty:
+        fields = {"ok": False, "error": f"no answer within {timeout:g} s"}
+    log("webhook", host=urlsplit(url).hostname, **fields)
 
 
 def run_command(command: Sequence[str], report: Path, folder: Path, timeout: float, log: RunLog) -> None:
@@ -80,3 +83,13 @@ def run_command(command: Sequence[str], report: Path, folder: Path, timeout: flo
         log("command", ok=False, program=command[0], error=f"exit code {ended.returncode}", printed=printed)
     else:
         log("command", ok=True, program=command[0], printed=printed)
+
+
+def _posted(url: str, report: str, timeout: float) -> dict[str, Any]:
+    headers = {"Content-Type": "application/json", "User-Agent": "motionary"}
+    try:
+        request = urllib.request.Request(url, report.encode(), headers, method="POST")
+        with urllib.request.urlopen(request, timeout=timeout) as answer:
+            return {"ok": True, "answer": answer.status}
+    except (OSError, HTTPException, ValueError) as error:  # ValueError: an address with a port that is none
+        return {"ok": False, "error": str(error) or type(error).__name__}

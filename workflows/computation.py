@@ -4,27 +4,72 @@ from __future__ import annotations
 
 import posixpath
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from functools import cached_property
 
-from motionary.catalog.store import Store
+from motionary.catalog.errors import CatalogError
+from motionary.catalog.snapshot import Snapshot, read_snapshot, snapshot_ids
+from motionary.catalog.store import PartFacts, Store
 from motionary.pipeline.task import Task, TaskReport
 from motionary.workflows.scheduler import Workers
 
 
 class StoredParts:
-    """The parts that a catalog's folder holds, whether a snapshot names them or not: one listing a table."""
+    """The parts that a catalog's folder holds, whether a snapshot names them or not: one listing a table.
 
-    def __init__(self, store: Store) -> None:
+    Parameters
+    ----------
+    store : Store
+        The catalog.
+    before : Snapshot, optional
+        The published one.
+    """
+
+    def __init__(self, store: Store, before: Snapshot | None) -> None:
         self._store = store
+        self._before = before
         self._keys: dict[str, set[str]] = {}
 
     def __call__(self, key: str, tables: Iterable[str]) -> bool:
         """Say whether a result is stored whole."""
         return all(key in self._of(table) for table in tables)
 
+    def facts(self, key: str, tables: Iterable[str]) -> dict[str, PartFacts] | None:
+        """Return what the parts of a result are known by; None where one is missing or not what was written.
+
+        Parts of the published snapshot are taken at its word, which `verify` checks. Others were left by a
+        run that was cut short, or belong to older snapshots: they are read.
+        """
+        tables = tuple(tables)
+        if not self(key, tables):
+            return None
+        found = {}
+        for table in tables:
+            file = self._store.part_name(table, key)
+            if self._before and file in self._before.parts:
+                found[table] = self._before.parts[file]
+                continue
+            try:
+                facts = self._store.facts(file)
+            except (OSError, ValueError):  # pyarrow says so of a damaged file
+                return None
+            if facts != self._older.get(file, facts):
+                return None
+            found[table] = facts
+        return found
+
     def add(self, report: TaskReport) -> None:
         """Take note of a result that has been stored."""
         for table in report.stored:
             self._of(table).add(report.key)
+
+    @cached_property
+    def _older(self) -> dict[str, PartFacts]:
+        facts: dict[str, PartFacts] = {}
+        for one in snapshot_ids(self._store):
+            with suppress(CatalogError, FileNotFoundError):  # a manifest that is damaged knows nothing
+                facts |= read_snapshot(self._store, one).parts
+        return facts
 
     def _of(self, table: str) -> set[str]:
         if table not in self._keys:
@@ -65,7 +110,8 @@ class Computation:
         list of TaskReport
             Of all tasks, in their order.
         """
-        missing = [task for task in tasks if not self._stored(task.key, task.makes)]
+        stored = {task.key: self._stored.facts(task.key, task.makes) for task in tasks}
+        missing = [task for task in tasks if stored[task.key] is None]
         reports = {report.key: report for report in self._workers.compute(missing, self._store, self._done)}
         for report in reports.values():
             self._stored.add(report)
@@ -73,5 +119,6 @@ class Computation:
         for task in tasks:
             if task.key not in reports:
                 self._done(task.stage)
-            found.append(reports.get(task.key) or TaskReport(task.stage, task.key, 0.0, False, {}))
+            facts = stored[task.key] or {}
+            found.append(reports.get(task.key) or TaskReport(task.stage, task.key, 0.0, False, facts))
         return found

@@ -101,7 +101,8 @@ def run(
             Workers(_processes(ready), job.scheduler, compiling) as workers,
         ):
             # Listed anew under the lock: a vacuum may have come between.
-            made = _compute(ready, Computation(ready.store, StoredParts(ready.store), workers, done))
+            stored = StoredParts(ready.store, ready.before)
+            made = _compute(ready, Computation(ready.store, stored, workers, done))
         catalog = publish_run(ready, made, started, check)
     computed = sum(report.computed for report in made)
     return RunResult(

@@ -230,4 +230,4 @@ def _stop(*_: object) -> NoReturn:
 
 
 def _passed_over(*_: object) -> None:
-    """Let the report and the announcement end: both are short. Unlike SIG_IGN, no command inherits it."""
+    """Let the announcement end, which has a deadline. Unlike SIG_IGN, no command inherits this."""

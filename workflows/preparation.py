@@ -10,10 +10,11 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from motionary.catalog import CatalogError
 from motionary.catalog.earlier import earlier_run, inputs_table, known_digests
 from motionary.catalog.labels import following
 from motionary.catalog.schema import SCHEMAS
-from motionary.catalog.snapshot import Snapshot, current_snapshot
+from motionary.catalog.snapshot import CURRENT, Snapshot, current_snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
@@ -95,13 +96,25 @@ def prepare(job: Job) -> Prepared:
 
     earlier = earlier_run(store, before)
     layout = lay_out(sources, reading_settings(job.config), job.config.distances.tile, earlier)
+    _refuse_without_numbers(store, before)
     said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
     labels = following(said or SCHEMAS["labels"].empty_table(), inputs_table(layout))
     overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
-    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, StoredParts(store))
+    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, StoredParts(store, before))
     plan = plan_run(graph, store, before, job.workers)
     stale = _stale_labels(job, supplied, _renamed(earlier, layout), store, before)
     return Prepared(job, store, roots, supplied, stale, before, labels, graph, plan)
+
+
+def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:
+    """Refuse to number clusters anew where the numbers that they had are lost."""
+    for table in ("members", "lineage"):
+        for file in before.tables.get(table, ()) if before else ():
+            if not store.filesystem.exists(store.path(file)):
+                raise CatalogError(
+                    f"{store.full_path(file)} is gone, and with it the clusters' numbers; restore it, or "
+                    f"write the id of an earlier snapshot into {store.full_path(CURRENT)} and run again"
+                )
 
 
 def _renamed(earlier: Earlier, layout: Layout) -> dict[str, str]:

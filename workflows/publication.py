@@ -63,9 +63,8 @@ def publish_run(
         file, parts[file] = store.save_whole(table, rows)
         tables[table] = [file]
     if before:
-        parts = {file: before.parts[file] for file in before.parts} | parts
-    listed = {file for files in tables.values() for file in files}
-    facts = {file: parts.get(file) or store.facts(file) for file in sorted(listed)}
+        parts = {**before.parts, **parts}
+    facts = {file: parts[file] for file in sorted({file for files in tables.values() for file in files})}
     now = datetime.now(UTC).isoformat(timespec="seconds")
     snapshot = Snapshot(snapshot_id, now, tables, facts, ready.graph.settings, versions())
 

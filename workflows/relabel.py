@@ -139,7 +139,5 @@ def _named(current: Catalog, labels: pa.Table) -> dict[str, dict[str, PartFacts]
     )
     task = naming_task(clustered, represented, overrides, PipelineConfig(clusters=settings))
     files = {table: store.part_name(table, task.key) for table in task.makes}
-    if StoredParts(store)(task.key, task.makes):
-        return {table: {file: store.facts(file)} for table, file in files.items()}
-    stored = run_task(task, store).stored
+    stored = StoredParts(store, current.snapshot).facts(task.key, task.makes) or run_task(task, store).stored
     return {table: {file: stored[table]} for table, file in files.items()}

@@ -1,4 +1,8 @@
-"""The report of a nightly run: `<run_id>.json`, written whole or not at all, also when the run fails."""
+"""The report of a nightly run: `<run_id>.json`, written whole or not at all, also when the run fails.
+
+Where another run has a report of that name, as one of another catalog that began in the same second, this one
+is `<run_id>-2.json`: no report takes another's place.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,10 @@ import math
 import os
 import platform
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -107,7 +113,7 @@ class RunReport:
         return json.dumps(asdict(self), indent=1, default=str)
 
     def write(self, folder: Path) -> Path:
-        """Write the report to a folder, which is made where there is none.
+        """Write the report to a folder, which is made where there is none; return its path.
 
         Raises
         ------
@@ -116,10 +122,15 @@ class RunReport:
         """
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{self.run_id}.json"
-        with whole_file(file) as temporary, temporary.open("w", encoding="utf-8") as stream:
-            stream.write(self.to_json() + "\n")
-            stream.flush()
-            os.fsync(stream.fileno())
+        for number in count(2):
+            with suppress(FileExistsError), whole_file(file) as temporary:
+                with temporary.open("w", encoding="utf-8") as stream:
+                    stream.write(self.to_json() + "\n")
+                    stream.flush()
+                    os.fsync(stream.fileno())
+                file.touch(exist_ok=False)  # takes the name, which the block's end replaces
+                break
+            file = folder / f"{self.run_id}-{number}.json"
         return file
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from motionary.catalog.checks.clips import count_frames
-from motionary.catalog.checks.found import Found, wrong_rows
+from motionary.catalog.checks.found import Found, not_finite, wrong_rows
 from motionary.catalog.query import Catalog
 
 
@@ -31,7 +31,7 @@ def clips_are_aligned(catalog: Catalog) -> Found:
 
 
 def aligned_frames_are_the_references(catalog: Catalog) -> Found:
-    """Every aligned clip has its reference's frames, numbered from 0."""
+    """Every aligned clip has its reference's frames, numbered from 0; all values are finite."""
     lengths, wrong = count_frames(catalog, "aligned")
     rows = catalog.sql('select c.clip_id, frames from clusters c left join "references" r using (cluster_id)')
     expected = dict(zip(*(column.to_pylist() for column in rows.columns), strict=True))
@@ -39,6 +39,7 @@ def aligned_frames_are_the_references(catalog: Catalog) -> Found:
         there, wanted = lengths.get(clip_id, 0), expected.get(clip_id)
         if there != wanted:
             wrong.append(f"{clip_id} has {there} aligned frames, its reference {wanted or 'none'}")
+    wrong += not_finite(catalog, "aligned")
     return Found(f"{sum(lengths.values())} frames of {len(lengths)} clips", wrong)
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionary.catalog.checks.found import Found, has, parts, wrong_rows
+from motionary.catalog.checks.found import Found, has, not_finite, parts, wrong_rows
 from motionary.catalog.query import Catalog
 
 
@@ -51,7 +51,7 @@ def clips_are_accounted_for(catalog: Catalog) -> Found:
 
 
 def clips_have_their_frames(catalog: Catalog, table: str) -> Found:
-    """Every clip has its frames in a table, numbered from 0, in order and in one place."""
+    """Every clip has its frames in a table, numbered from 0, in order, in one place, their values finite."""
     lengths, wrong = count_frames(catalog, table)
     expected = {
         clip_id: frames
@@ -66,7 +66,41 @@ def clips_have_their_frames(catalog: Catalog, table: str) -> Found:
             for clip_id in sorted(lengths.keys() & expected.keys())
             if lengths[clip_id] != expected[clip_id]
         ]
+    wrong += not_finite(catalog, table)
     return Found(f"{sum(lengths.values())} frames of {len(lengths)} clips", wrong)
+
+
+def merged_frames_cover_every_frame(catalog: Catalog) -> Found:
+    """Every frame at the common rate is in one merged frame, and these stand in order."""
+    wrong = wrong_rows(
+        catalog,
+        """select concat_ws(' ', 'merged frame', frame, 'of', clip_id, 'runs from', first_frame, 'to',
+                            last_frame, 'after', before)
+           from (select *, coalesce(lag(last_frame) over (partition by clip_id order by frame), -1) as before
+                 from resampled)
+           where first_frame > last_frame or first_frame <> before + 1""",
+        """select concat_ws(' ', 'the merged frames of', clip_id, 'end at', ends, 'its frames at', last)
+           from (select clip_id, max(last_frame) as ends from resampled group by clip_id)
+           join (select clip_id, max(frame) as last from features group by clip_id) using (clip_id)
+           where ends <> last""",
+    )
+    return Found(f"{len(catalog.resampled)} merged frames", wrong)
+
+
+def the_run_counted_them(catalog: Catalog) -> Found:
+    """Every count of the last run's record, of clips, quarantine and clusters, is that of the tables."""
+    run = catalog.runs.to_arrow().to_pylist()[-1]
+    counts = catalog.sql(
+        """select (select count(distinct clip_id) from clips) as clips,
+                  (select count(distinct path) from quarantine) as quarantined,
+                  (select count(distinct cluster_id) from "references") as clusters"""
+    ).to_pylist()[0]
+    wrong = [
+        f"run {run['run_id']} counted {run[name]} {name}, there are {there}"
+        for name, there in counts.items()
+        if run[name] != there
+    ]
+    return Found(f"run {run['run_id']}", wrong)
 
 
 def count_frames(catalog: Catalog, table: str) -> tuple[dict[str, int], list[str]]:

@@ -39,8 +39,29 @@ def clusters_have_a_reference(catalog: Catalog) -> Found:
            where c.clip_id <> r.clip_id""",
         """select concat_ws(' ', 'reference', clip_id, 'lies', distance_to_reference, 'from itself')
            from clusters where is_reference and distance_to_reference <> 0""",
+        """select 'reference ' || r.clip_id || ' was made from other bytes than its clip'
+           from "references" r join clips using (clip_id) where r.digest <> clips.digest""",
     )
     return Found(f"{len(catalog.references)} clusters", wrong)
+
+
+def distances_to_references_are_the_pairs(catalog: Catalog) -> Found:
+    """Every clip lies as far from its cluster's reference as the two do as a pair.
+
+    Pairs that are missing, and distances that are none, have checks of their own.
+    """
+    metric = catalog.settings["clusters"]["metric"]
+    wrong = wrong_rows(
+        catalog,
+        f"""select concat_ws(' ', 'clip', c.clip_id, 'lies', distance_to_reference, 'from its reference',
+                             r.clip_id, 'and', p.{metric}, 'as a pair')
+            from clusters c join "references" r using (cluster_id)
+            join pairs p on p.clip_a = least(c.clip_id, r.clip_id)
+                        and p.clip_b = greatest(c.clip_id, r.clip_id)
+            where not c.is_reference and isfinite(p.{metric})
+                  and cast(distance_to_reference as float) <> p.{metric}""",
+    )
+    return Found(f"{len(catalog.clusters)} clips, by {metric}", wrong)
 
 
 def labels_are_consistent(catalog: Catalog) -> Found:
@@ -70,6 +91,11 @@ def labels_are_consistent(catalog: Catalog) -> Found:
             from ({source}) where {rule}"""
         for rule, problem in rules.items()
     ]
+    if has(catalog, "labels"):
+        queries.append(
+            "select 'clip ' || clip_id || ' has ' || count(*) || ' names by persons' from labels "
+            "group by clip_id having count(*) > 1"
+        )
     counts = catalog.sql("select label_source, count(*) as clips from clusters group by all order by all")
     seen = ", ".join(f"{row['clips']} {row['label_source']}" for row in counts.to_pylist())
     return Found(seen or "no clips", wrong_rows(catalog, *queries))

@@ -59,7 +59,10 @@ def _faults(merges: pa.Table, clips: int) -> list[str]:
 
 
 def partitions_hold_every_clip(catalog: Catalog) -> Found:
-    """Every partition puts every clip into one cluster; it has as many as its cut says, from 0."""
+    """Every partition puts every clip into one cluster; it has as many as its cut says, from 0.
+
+    One of the cuts is the primary one, from which the published clusters come.
+    """
     wrong = wrong_rows(
         catalog,
         """select concat_ws(' ', 'partition', method, metric, 'holds', clip_id, count(*), 'times')
@@ -75,6 +78,9 @@ def partitions_hold_every_clip(catalog: Catalog) -> Found:
            from partitions join cuts using (method, metric) group by method, metric
            having min(cluster) <> 0 or max(cluster) <> count(distinct cluster) - 1
                   or count(distinct cluster) <> any_value(n_clusters)""",
+        """select number || ' cuts are the primary one'
+           from (select count(*) filter ("primary") as number from cuts)
+           where number <> 1 and exists (from clips)""",
     )
     seen = catalog.sql("select count(*) as partitions from cuts")["partitions"][0]
     return Found(f"{seen} partitions", wrong)

@@ -8,9 +8,11 @@ from itertools import groupby
 from operator import itemgetter
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from motionary.catalog.query import Catalog
+from motionary.catalog.schema import SCHEMAS
 
 MOST_TOLD = 3
 
@@ -65,3 +67,27 @@ def parts(catalog: Catalog, table: str, columns: Sequence[str]) -> Iterator[tupl
     filesystem = catalog.store.filesystem
     for file in catalog.files(table):
         yield file, pq.read_table(catalog.store.path(file), filesystem=filesystem, columns=list(columns))
+
+
+def not_finite(catalog: Catalog, table: str) -> list[str]:
+    """Tell which clips hold a value that is infinite or no number, file by file and column by column."""
+    schema, wrong = SCHEMAS[table], []
+    columns = [field.name for field in schema if _holds_floats(field.type)]
+    for file, rows in parts(catalog, table, ["clip_id", *columns]):
+        for name in columns:
+            values = rows[name].combine_chunks()
+            places = None if pa.types.is_floating(values.type) else pc.list_parent_indices(values)
+            values = values if places is None else pc.list_flatten(values)
+            strange = pc.invert(pc.fill_null(pc.is_finite(values), False))
+            if pc.any(strange).as_py():
+                row = pc.index(strange, True).as_py()
+                row = row if places is None else places[row].as_py()
+                wrong.append(
+                    f"{name} of clip {rows['clip_id'][row]} in {file} holds what is no finite number"
+                )
+    return wrong
+
+
+def _holds_floats(type_: pa.DataType) -> bool:
+    inner = type_.value_type if pa.types.is_list(type_) or pa.types.is_fixed_size_list(type_) else type_
+    return bool(pa.types.is_floating(inner))

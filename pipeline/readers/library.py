@@ -142,7 +142,7 @@ def scan_library(
 def _prefixes(folders: Sequence[Path]) -> list[str]:
     if len(folders) == 1:
         return [""]
-    names = [folder.resolve().name for folder in folders]
+    names = [Path(os.path.abspath(folder)).name for folder in folders]  # noqa: PTH100 - a link's own name
     for place, name in enumerate(names):
         if name in names[:place]:
             first = folders[names.index(name)]

@@ -16,7 +16,7 @@ from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.stages.columns import condensed, condensed_places, matrix, per_clip
 from motionary.pipeline.tables import TABLES
 
-VERSION = 3
+VERSION = 4
 MAKES = ("represented", "centres", "reference_features")
 
 
@@ -73,6 +73,8 @@ def represent(
             index = clip_ids.index(kept[one])
             row, frames = earlier[one] | {"clip_id": kept[one]}, earlier_features[one]["feature"]
         else:
+            # In the order of their contents: of equally good references none is chosen for its name.
+            inside = np.array(sorted(inside, key=lambda i: digests[clip_ids[i]]))
             poses = [matrix(sequences[clip_ids[i]]["feature"])[:, :POSE_COLUMNS] for i in inside]
             scores = score_references(poses, weights, distances=weighted[np.ix_(inside, inside)])
             index = int(inside[scores.index])

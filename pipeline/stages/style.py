@@ -12,7 +12,7 @@ from motionary.pipeline.stages.motions import read_motion_rows
 from motionary.pipeline.style import Residual, StyleSpace, residuals
 from motionary.pipeline.tables import TABLES
 
-VERSION = 1
+VERSION = 2
 MAKES = ("styles",)
 
 
@@ -63,16 +63,17 @@ def style(
             place = {"cluster_id": cluster_id, "reference_id": reference_of[cluster_id]}
             rows |= {one: earlier[kept[one]] | {"clip_id": one} | place for one in clip_ids}
             continue
-        motions = {one: read_motion_rows(clip_rows[one], frames[one], frame_rate) for one in clip_ids}
+        in_order = sorted(clip_ids, key=lambda one: clip_rows[one]["digest"])  # names decide nothing
+        motions = {one: read_motion_rows(clip_rows[one], frames[one], frame_rate) for one in in_order}
         reference_id = reference_of[cluster_id]
         found = residuals([*motions.values()], motions[reference_id], conventions=conventions)
         space = StyleSpace.fit([one.vector() for one in found])
-        for clip_id, one, scores in zip(clip_ids, found, space.scores, strict=True):
+        for clip_id, one, scores in zip(in_order, found, space.scores, strict=True):
             place = {"clip_id": clip_id, "cluster_id": cluster_id, "reference_id": reference_id}
             explained = space.explained_variance_ratio.tolist()
             rows[clip_id] = place | _energies(one) | {"scores": scores.tolist(), "explained": explained}
-    in_order = [rows[clip_id] for clip_id in represented["clip_id"].to_pylist()]
-    return {"styles": pa.Table.from_pylist(in_order, schema=TABLES["styles"])}
+    every = [rows[clip_id] for clip_id in represented["clip_id"].to_pylist()]
+    return {"styles": pa.Table.from_pylist(every, schema=TABLES["styles"])}
 
 
 def _energies(residual: Residual) -> dict:
