@@ -41,21 +41,21 @@ class Job:
         Every stage's settings.
     labels : Path, optional
         CSV of supplied labels.
-    label_pattern : str, optional
-        Regular expression on clip_ids whose named groups are label columns; a value of the CSV wins.
     workers : int
         Processes on this machine.
     scheduler : str, optional
         A running Dask scheduler instead.
+    label_pattern : str, optional
+        Regular expression on clip_ids whose named groups are label columns; a value of the CSV wins.
     """
 
     libraries: Sequence[str]
     catalog: str
     config: PipelineConfig
     labels: Path | None = None
-    label_pattern: str | None = None
     workers: int = 1
     scheduler: str | None = None
+    label_pattern: str | None = None
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,8 @@ def start(arguments: list[str], log: Path, before: Callable[[], object] = lambda
         with log.open("wb") as file:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
+        # The parent may have put something else in their places, as pytest does.
+        sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
         before()
         code = run_here(arguments)
     except BaseException:

@@ -108,7 +108,7 @@ def run(
 
     libraries = [str(one) for one in (library, *(also or []))]
     job = Job(
-        libraries, catalog, load_settings(config, options), labels, label_pattern, _count(workers), scheduler
+        libraries, catalog, load_settings(config, options), labels, _count(workers), scheduler, label_pattern
     )
     if dry_run:
         print(prepare(job).plan)
