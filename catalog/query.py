@@ -199,7 +199,8 @@ class Catalog:
                 if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
                     raise CatalogError("a catalog is only read: give one statement that selects")
                 return connection.sql(query, params=parameters).to_arrow_table()
-            except (duckdb.Error, UnicodeDecodeError) as error:
+            # RuntimeError: what DuckDB says of a damaged file can be no text.
+            except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
                 wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
                 damage = (
                     None if isinstance(error, wrong) else damaged_file(self.store, self.snapshot, PUBLISHED)

@@ -25,6 +25,7 @@ ASIDE = ".going"
 OVERVIEW = "overview.html"
 """The page that a run leaves in the catalog's folder."""
 
+_LONGEST_ID = 18
 _PART = re.compile(r"tables/\w+/[\w.-]+\.parquet", re.ASCII)
 
 
@@ -235,6 +236,9 @@ def _read_manifest(manifest: dict, snapshot_id: str) -> Snapshot:
     strange = [file for file in snapshot.files if not _PART.fullmatch(file)]
     if strange:  # a path out of the catalog would let a query read what it names
         raise ValueError(f"{strange[0][:80]!r} is no part's name")
+    empty = [table for table, files in tables.items() if not files]
+    if empty:
+        raise ValueError(f"it names no file of table {empty[0][:40]!r}")
     if snapshot.snapshot_id != snapshot_id:
         raise ValueError(f"it is that of snapshot {str(snapshot.snapshot_id)[:40]!r}")
     if snapshot.after == snapshot_id:
@@ -244,4 +248,4 @@ def _read_manifest(manifest: dict, snapshot_id: str) -> Snapshot:
 
 
 def _is_id(name: str) -> bool:
-    return name.isascii() and name.isdigit()
+    return name.isascii() and name.isdigit() and len(name) <= _LONGEST_ID

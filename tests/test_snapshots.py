@@ -95,7 +95,7 @@ def test_numbers_go_on_past_six_digits(store, publish_rows):
     assert Catalog.open(store.url, 1000000).snapshot == current_snapshot(store)
 
 
-@pytest.mark.parametrize("written", ["", "abc", "../000001", "-1", "000001\n000002", "1\x00"])
+@pytest.mark.parametrize("written", ["", "abc", "../000001", "-1", "000001\n000002", "1\x00", "9" * 300])
 def test_a_damaged_current_is_one_clear_error(store, publish_rows, written):
     publish_rows(store)
     store.write("CURRENT", written.encode())
@@ -116,6 +116,7 @@ def edited(**fields) -> dict:
         b"[" * 100_000,
         json.dumps(edited(tables=["clips"])).encode(),
         json.dumps(edited(tables={"clips": 1})).encode(),
+        json.dumps(edited(tables={"clips": []})).encode(),
         json.dumps(edited(parts={"a": {"rows": 1}})).encode(),
         json.dumps(edited(another=1)).encode(),
         json.dumps(edited(schema_version="new")).encode(),
