@@ -17,11 +17,17 @@ from motionary.pipeline.readers.library import FileState, KnownDigest
 from motionary.pipeline.task import MAKES
 
 
-def earlier_run(store: Store, snapshot: Snapshot | None) -> Earlier:
-    """Describe a published run as one to build upon; a motionary that did not list its inputs offers none."""
+def published_inputs(store: Store, snapshot: Snapshot | None) -> pa.Table:
+    """Read which clips a published run found; none where a motionary published it that did not list them."""
     if snapshot is None or "inputs" not in snapshot.tables:
+        return SCHEMAS["inputs"].empty_table()
+    return store.read(snapshot.tables["inputs"])
+
+
+def earlier_run(store: Store, snapshot: Snapshot | None, inputs: pa.Table) -> Earlier:
+    """Describe a published run with its inputs as one to build upon."""
+    if snapshot is None or not len(inputs):
         return Earlier()
-    inputs = store.read(snapshot.tables["inputs"])
     quarantine = store.read(snapshot.tables["quarantine"])
     batches: dict[int, dict[str, str]] = {}
     for row in inputs.select(["clip_id", "key", "batch"]).to_pylist():
@@ -37,11 +43,8 @@ def earlier_run(store: Store, snapshot: Snapshot | None) -> Earlier:
     )
 
 
-def known_digests(store: Store, snapshot: Snapshot | None) -> KnownDigest:
-    """Return who knows the digests of files that were not touched since the published run."""
-    if snapshot is None or "inputs" not in snapshot.tables:
-        return lambda states: None
-    inputs = store.read(snapshot.tables["inputs"])
+def known_digests(inputs: pa.Table) -> KnownDigest:
+    """Return who knows the digests of files that were not touched since the run of these inputs."""
     inputs = inputs.filter(pc.greater(pc.list_value_length(inputs["files"]), 0))
     known = {
         tuple(FileState(**state) for state in row["files"]): row["digest"]

@@ -16,7 +16,6 @@ caller gives.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -91,6 +90,11 @@ class LibraryGraph:
         return stage_settings(self.config)
 
     @cached_property
+    def names(self) -> dict[str, str]:
+        """Of every clip that was there in the earlier run, what it was called."""
+        return self.earlier.names_of(self.layout.digests)
+
+    @cached_property
     def ingested(self) -> list[Task]:
         """Every batch read."""
         made: list[Task] = []
@@ -157,7 +161,7 @@ class LibraryGraph:
             "identify", before if same and before else self._key("identify", (self.clustered.key, before)),
             identify.identify,
             reads=[("groups", [self.clustered.key]), *((table, _list(before)) for table in identify.MAKES)],
-            arguments=(self.earlier.names_of(self.layout.digests), self.earlier.snapshot_id),
+            arguments=(self.names, self.earlier.snapshot_id),
         )  # fmt: skip
 
     def comparison(self) -> list[Task]:
@@ -170,27 +174,6 @@ class LibraryGraph:
         counts["ingest"] = counts["resample"] = counts["align"] = len(self.ingested)
         counts["compare"] = len(self.compared)
         return counts
-
-    def contents_to_read(self) -> int:
-        """Count the different contents that no stored result holds."""
-        missing = [
-            {clip.key for clip in batch}.difference(
-                self.layout.keys[one] for _, names in task.carries or () for one in names
-            )
-            for task, batch in zip(self.ingested, self.layout.batches, strict=True)
-            if not self.is_stored(task.key, task.makes)
-        ]
-        return sum(map(len, missing))
-
-    def pairs_to_compare(self) -> int:
-        """Count the pairs that no stored result holds, were every clip to be read."""
-        tiles = combinations_with_replacement(self.layout.batches, 2)
-        count = 0
-        for task, (first, second) in zip(self.compared, tiles, strict=True):
-            if not self.is_stored(task.key, task.makes):
-                pairs = len(first) * (len(first) - 1) // 2 if first is second else len(first) * len(second)
-                count += pairs - _carried_count(task, within=first is second)
-        return count
 
     def representation(self, members: pa.Table, earlier: pa.Table) -> Task:
         """Choose the references.
@@ -335,15 +318,6 @@ def naming_task(clustered: str, represented: str, overrides: pa.Table, config: P
 
 def _named(overrides: pa.Table) -> list[tuple[str, str]]:
     return [*_pairs(overrides, "clip_id", "label").items()]
-
-
-def _carried_count(task: Task, *, within: bool) -> int:
-    """Count the pairs that blocks hold, none of a clip with itself; within one batch all are there twice."""
-    count = 0
-    for _, block in task.carries or ():
-        one, other = Counter(block.first.values()), Counter(block.second.values())
-        count += one.total() * other.total() - sum(one[there] * other[there] for there in one)
-    return count // 2 if within else count
 
 
 def _pairs(table: pa.Table, one: str, other: str) -> dict[Any, Any]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.graph import LibraryGraph
+from motionary.pipeline.task import Task
 
 
 @dataclass(frozen=True)
@@ -62,10 +65,10 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
         Among which the work is divided.
     """
     digests, earlier = graph.layout.digests, graph.earlier.digests
-    names = graph.earlier.names_of(digests)
+    names = graph.names
     renamed = sum(one not in earlier for one in names)
     changed = sum(one in earlier and earlier[one] != digest for one, digest in digests.items())
-    to_read, to_compare = graph.contents_to_read(), graph.pairs_to_compare()
+    to_read, to_compare = _contents_to_read(graph), _pairs_to_compare(graph)
     new = len(digests) - len(names)
     removed = len(earlier) - len(names)
     touched = new + changed + removed
@@ -75,6 +78,38 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
         to_read=to_read, to_compare=to_compare,
         seconds=_seconds(store, before, touched, to_read, to_compare, workers),
     )  # fmt: skip
+
+
+def _contents_to_read(graph: LibraryGraph) -> int:
+    """Count the different contents that no stored result holds."""
+    missing = [
+        {clip.key for clip in batch}.difference(
+            graph.layout.keys[one] for _, names in task.carries or () for one in names
+        )
+        for task, batch in zip(graph.ingested, graph.layout.batches, strict=True)
+        if not graph.is_stored(task.key, task.makes)
+    ]
+    return sum(map(len, missing))
+
+
+def _pairs_to_compare(graph: LibraryGraph) -> int:
+    """Count the pairs that no stored result holds, were every clip to be read."""
+    tiles = combinations_with_replacement(graph.layout.batches, 2)
+    count = 0
+    for task, (first, second) in zip(graph.compared, tiles, strict=True):
+        if not graph.is_stored(task.key, task.makes):
+            pairs = len(first) * (len(first) - 1) // 2 if first is second else len(first) * len(second)
+            count += pairs - _carried_count(task, within=first is second)
+    return count
+
+
+def _carried_count(task: Task, *, within: bool) -> int:
+    """Count the pairs that blocks hold, none of a clip with itself; within one batch all are there twice."""
+    count = 0
+    for _, block in task.carries or ():
+        one, other = Counter(block.first.values()), Counter(block.second.values())
+        count += one.total() * other.total() - sum(one[there] * other[there] for there in one)
+    return count // 2 if within else count
 
 
 def _seconds(

@@ -11,14 +11,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from motionary.catalog import CatalogError
-from motionary.catalog.earlier import earlier_run, inputs_table, known_digests
+from motionary.catalog.earlier import earlier_run, inputs_table, known_digests, published_inputs
 from motionary.catalog.labels import following
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import CURRENT, Snapshot, current_snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
-from motionary.pipeline.layout import Earlier, Layout, lay_out
+from motionary.pipeline.layout import lay_out
 from motionary.pipeline.readers.library import KnownDigest, Source, scan_library
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.workflows.computation import StoredParts
@@ -72,6 +72,7 @@ class Prepared:
     supplied: SuppliedLabels
     stale_labels: Mapping[str, str]
     before: Snapshot | None
+    inputs: pa.Table
     labels: pa.Table
     graph: LibraryGraph
     plan: Plan
@@ -87,23 +88,25 @@ def prepare(job: Job) -> Prepared:
     """
     store = Store(absolute(job.catalog))
     before = current_snapshot(store)
+    then = published_inputs(store, before)
     roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
-    sources = library_sources(roots, known_digests(store, before))
+    sources = library_sources(roots, known_digests(then))
     wanted = job.config.clusters.n_clusters
     if wanted is not None and wanted > len(sources):
         raise UserError(f"{wanted} clusters are asked for, and the library holds {len(sources)} clips")
     supplied = supplied_labels(job.labels, job.label_pattern, sources, job.config.clusters.label_column)
 
-    earlier = earlier_run(store, before)
+    earlier = earlier_run(store, before, then)
     layout = lay_out(sources, reading_settings(job.config), job.config.distances.tile, earlier)
     _refuse_without_numbers(store, before)
     said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
-    labels = following(said or SCHEMAS["labels"].empty_table(), inputs_table(layout))
+    inputs = inputs_table(layout)
+    labels = following(said or SCHEMAS["labels"].empty_table(), inputs)
     overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
     graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, StoredParts(store, before))
     plan = plan_run(graph, store, before, job.workers)
-    stale = _stale_labels(job, supplied, _renamed(earlier, layout), store, before)
-    return Prepared(job, store, roots, supplied, stale, before, labels, graph, plan)
+    stale = _stale_labels(job, supplied, graph.names, then)
+    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, graph, plan)
 
 
 def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:
@@ -117,19 +120,15 @@ def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:
                 )
 
 
-def _renamed(earlier: Earlier, layout: Layout) -> dict[str, str]:
-    names = earlier.names_of(layout.digests)
-    return {before: now for now, before in names.items() if before != now}
-
-
 def _stale_labels(
-    job: Job, supplied: SuppliedLabels, now: Mapping[str, str], store: Store, before: Snapshot | None
+    job: Job, supplied: SuppliedLabels, names: Mapping[str, str], inputs: pa.Table
 ) -> dict[str, str]:
-    if job.labels is None or before is None or not supplied.outside or not now:
+    now = {before: clip_id for clip_id, before in names.items() if before != clip_id}
+    if job.labels is None or not supplied.outside or not now:
         return {}
     then = {
         os.path.realpath(os.path.join(row["root"], row["path"])): row["clip_id"]  # noqa: PTH118
-        for row in store.read(before.tables["inputs"]).select(["clip_id", "root", "path"]).to_pylist()
+        for row in inputs.select(["clip_id", "root", "path"]).to_pylist()
         if row["clip_id"] in now
     }
     clip_ids = {

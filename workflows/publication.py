@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 import pyarrow as pa
 
 from motionary.catalog import Catalog
-from motionary.catalog.earlier import inputs_table
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import OVERVIEW, Snapshot, next_snapshot_id, publish
 from motionary.catalog.views.overview import overview_page
@@ -55,7 +54,7 @@ def publish_run(
     runs = store.read(before.tables["runs"]) if before else SCHEMAS["runs"].empty_table()
     record = _record(ready, made, tables, run_id, started)
     own = {
-        "inputs": inputs_table(ready.graph.layout),
+        "inputs": ready.inputs,
         "labels": ready.labels,
         "runs": pa.concat_tables([runs, record], promote_options="default"),
     }

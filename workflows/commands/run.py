@@ -87,6 +87,7 @@ def run(
     ] = False,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
+    from motionary.workflows.preparation import Job, prepare
     from motionary.workflows.settings import PAPER, load_settings
 
     if clusters is not None and threshold is not None:
@@ -104,8 +105,6 @@ def run(
     options["alignment"] = ({"weights": weights} if weights else {}) | (
         {"search": "full"} if full_grid else {}
     )
-    from motionary.workflows.preparation import Job, prepare
-
     libraries = [str(one) for one in (library, *(also or []))]
     job = Job(
         libraries, catalog, load_settings(config, options), labels, _count(workers), scheduler, label_pattern
