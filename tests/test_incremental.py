@@ -127,6 +127,17 @@ def test_equal_bytes_at_two_paths_are_two_clips_computed_once(takes, after_first
     assert twins["weighted"].to_pylist() == [0, 0]
 
 
+def test_equal_bytes_in_several_batches_are_computed_once(takes, after_first, work, another):
+    for number in range(9):
+        shutil.copy(another, takes / f"{number}.bvh")
+    result = after_first()
+    assert len(set(result.catalog.inputs.to_pandas().query("clip_id < 'a'")["batch"])) > 1
+    assert work["read"] == 1
+    # One with ten others, and in each of few tiles a clip with itself; all pairs would be 126.
+    assert 10 <= work["compared"] <= 20
+    assert len(result.catalog.pairs) == 19 * 18 // 2
+
+
 def test_a_changed_clip_is_read_again(takes, after_first, work, another):
     changed = sorted((takes / "walk").iterdir())[0]
     shutil.copy(another, changed)

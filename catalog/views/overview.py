@@ -95,7 +95,7 @@ def _clusters(catalog: Catalog) -> str:
     ]
     return section(
         "Clusters",
-        "Clips that move alike. Purity is the share of the commonest supplied label; the reference is the "
+        "Clips that move alike. Purity is the share of the commonest own label; the reference is the "
         "clip that the others are aligned to.",
         table(["", "cluster", "name", "clips", "purity", "reference"], cells),
         '<p class="quiet after">The clips of each cluster, nearest to its reference first:</p>',
