@@ -45,7 +45,11 @@ def csv_of(table: pa.Table, monkeypatch) -> str:
     return sink.getvalue().decode()
 
 
-@given(texts=st.lists(TRICKY, min_size=1, max_size=4))
+# Arrow's text is UTF-8: a lone surrogate cannot be in a table.
+STORABLE = TRICKY.filter(lambda text: not any("\ud800" <= one <= "\udfff" for one in text))
+
+
+@given(texts=st.lists(STORABLE, min_size=1, max_size=4))
 def test_a_table_written_is_a_table_read(texts):
     with pytest.MonkeyPatch.context() as patch:
         written = csv_of(pa.table({"text": texts, "row": range(len(texts))}), patch)
