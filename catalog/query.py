@@ -1,59 +1,34 @@
-"""A catalog as people use it: tables, SQL, motions."""
+"""A catalog as people use it: tables, SQL, motions, and the questions that are asked of it."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
-from fsspec.implementations.local import LocalFileSystem
 
-from motionary.catalog.damage import damaged_file, named_if_damaged
-from motionary.catalog.errors import CatalogError
+from motionary.catalog.errors import CatalogError, nearest
 from motionary.catalog.leases import Lease
+from motionary.catalog.motions import stream_motions
 from motionary.catalog.opening import open_snapshot
-from motionary.catalog.schema import PUBLISHED, SCHEMAS
+from motionary.catalog.selection import Selection, Wanted
 from motionary.catalog.snapshot import Snapshot, snapshot_ids
 from motionary.catalog.store import Store
+from motionary.catalog.table import CatalogTable
+from motionary.pipeline.config import PipelineConfig, config_of
 from motionary.pipeline.motion import Motion
-from motionary.pipeline.stages.motions import read_motion_rows
 
 if TYPE_CHECKING:
-    import duckdb
-    import pandas as pd
-
+    from motionary.catalog.description import Description
     from motionary.catalog.export import ExportedClip
     from motionary.catalog.export_plan import ExportFormat
+    from motionary.catalog.sql import Parameters
 
-
-@dataclass(frozen=True)
-class CatalogTable:
-    """One table of an opened catalog, read when asked for."""
-
-    name: str
-    store: Store
-    files: Sequence[str]
-    lease: Lease | None = field(default=None, repr=False, compare=False)
-
-    def to_arrow(self) -> pa.Table:
-        """Read the table with its units in the field metadata."""
-        with named_if_damaged(f"a file of table {self.name} of {self.store.url}"):
-            return self.store.read(self.files)
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Read the table as a data frame."""
-        return self.to_arrow().to_pandas()
-
-    def __len__(self) -> int:
-        return self.store.rows(self.files)
-
-    def __repr__(self) -> str:
-        return f"<{self.name}: {len(self)} rows, {', '.join(SCHEMAS[self.name].names)}>"
+T = TypeVar("T")
 
 
 class _Table:
@@ -86,6 +61,8 @@ class Catalog:
     >>> catalog = Catalog.open("takes.catalog")                                    # doctest: +SKIP
     >>> earlier = Catalog.open("takes.catalog", snapshot=3)                        # doctest: +SKIP
     >>> catalog.sql("select label, count(*) from clusters group by label")         # doctest: +SKIP
+    >>> for motion in catalog.filter(label="walk", min_seconds=3).motions():       # doctest: +SKIP
+    ...     motion.positions()
     """
 
     clips = _Table()
@@ -111,6 +88,8 @@ class Catalog:
         self.store = store
         self.snapshot = snapshot
         self.lease = lease
+        self._kept: dict[str, Any] = {}
+        self._keeping = threading.RLock()
 
     @classmethod
     def open(cls, url: str | os.PathLike[str], snapshot: int | str | None = None) -> Catalog:
@@ -132,7 +111,12 @@ class Catalog:
         return cls(store, *open_snapshot(store, snapshot))
 
     def close(self) -> None:
-        """Give the snapshot up: vacuum may remove it."""
+        """Give the snapshot up, which vacuum may then remove, and what was kept in memory."""
+        with self._keeping:
+            session = self._kept.pop("sql", None)
+            self._kept.clear()
+        if session is not None:
+            session.close()
         if self.lease is not None:
             self.lease.release()
 
@@ -145,6 +129,13 @@ class Catalog:
     def __reduce__(self) -> tuple:
         return Catalog, (self.store, self.snapshot)  # a lease stays with the process that took it
 
+    def keep(self, key: str, make: Callable[[], T]) -> T:
+        """Return what is asked for again and again, made when it is first asked for, until `close`."""
+        with self._keeping:
+            if key not in self._kept:
+                self._kept[key] = make()
+            return self._kept[key]
+
     def snapshots(self) -> list[str]:
         """List the ids of the snapshots that are there, oldest first."""
         return snapshot_ids(self.store)
@@ -152,10 +143,24 @@ class Catalog:
     def __repr__(self) -> str:
         return f"<Catalog {self.store.url}: {len(self.clips)} clips, snapshot {self.snapshot.snapshot_id}>"
 
+    def _repr_html_(self) -> str:
+        return self.describe()._repr_html_()
+
     @property
     def settings(self) -> dict[str, Any]:
         """The settings of the run that made the snapshot, by stage."""
         return json.loads(self.runs.to_arrow()["settings"][-1].as_py())
+
+    @property
+    def config(self) -> PipelineConfig:
+        """Those settings as the pipeline takes them.
+
+        Raises
+        ------
+        CatalogError
+            Another version of motionary made the snapshot, which knew other settings.
+        """
+        return self.keep("config", self._read_config)
 
     def files(self, table: str) -> Sequence[str]:
         """List the Parquet files of a table, relative to the catalog.
@@ -173,10 +178,11 @@ class Catalog:
                 f"motionary run LIBRARY {self.store.url}"
             ) from None
 
-    def sql(self, query: str, parameters: Sequence[object] | Mapping[str, object] | None = None) -> pa.Table:
+    def sql(self, query: str, parameters: Parameters | None = None) -> pa.Table:
         """Ask a question in DuckDB's SQL; every table of the catalog is a view of its name.
 
-        A query can read the catalog and nothing else: no other file, no address, no setting.
+        View `takes` has the columns of `clips`, but for the skeletons, and of `clusters`, a row a clip. A query
+        can read the catalog and nothing else: no other file, no address, no setting.
 
         Parameters
         ----------
@@ -190,22 +196,40 @@ class Catalog:
         CatalogError
             The query is not valid, with DuckDB's message; or a file of the catalog is damaged.
         """
-        import duckdb
+        from motionary.catalog.sql import SqlSession
 
-        with duckdb.connect() as connection:
-            try:
-                self._create_views(connection)
-                statements = connection.extract_statements(query)
-                if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
-                    raise CatalogError("a catalog is only read: give one statement that selects")
-                return connection.sql(query, params=parameters).to_arrow_table()
-            # RuntimeError: what DuckDB says of a damaged file can be no text.
-            except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
-                wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
-                damage = (
-                    None if isinstance(error, wrong) else damaged_file(self.store, self.snapshot, PUBLISHED)
-                )
-                raise CatalogError(damage or f"the query cannot be answered: {error}") from error
+        session = self.keep("sql", lambda: SqlSession(self.store, self.snapshot))
+        return session.answer(query, parameters)
+
+    def describe(self) -> Description:
+        """Sum up what the catalog holds."""
+        from motionary.catalog.description import describe
+
+        return describe(self)
+
+    def everything(self) -> Selection:
+        """Choose every clip."""
+        return Selection(self, sorted(self.clips.to_arrow()["clip_id"].to_pylist()))
+
+    def filter(
+        self, *, min_seconds: float | None = None, max_seconds: float | None = None, **columns: Wanted
+    ) -> Selection:
+        """Choose clips by what is known of them: `filter(label="walk", style="tired", min_seconds=3)`.
+
+        See `Selection.filter`.
+        """
+        return self.everything().filter(min_seconds=min_seconds, max_seconds=max_seconds, **columns)
+
+    def where(self, condition: str, parameters: Parameters | None = None) -> Selection:
+        """Choose clips by a condition in SQL: `where("style = ? and seconds > 3", ["tired"])`.
+
+        See `Selection.where`.
+        """
+        return self.everything().where(condition, parameters)
+
+    def sample(self, n: int, seed: int = 0) -> Selection:
+        """Draw some clips; see `Selection.sample`."""
+        return self.everything().sample(n, seed)
 
     def motion(self, clip_id: str) -> Motion:
         """Read a clip's motion as it was captured.
@@ -215,8 +239,7 @@ class Catalog:
         CatalogError
             The catalog has no such clip.
         """
-        clip = self._clip(clip_id)
-        return self._motion(clip, "frames", clip["fps"])
+        return self._motion(clip_id, aligned=False)
 
     def aligned(self, clip_id: str) -> Motion:
         """Read a clip's motion aligned in time to its cluster's reference.
@@ -226,10 +249,7 @@ class Catalog:
         CatalogError
             The catalog has no such clip.
         """
-        alignments = self.alignments.to_arrow()
-        clip = self._clip(clip_id)
-        row = alignments.filter(pc.equal(alignments["clip_id"], clip_id))
-        return self._motion(clip, "aligned", row["frame_rate"][0].as_py())
+        return self._motion(clip_id, aligned=True)
 
     def export(
         self,
@@ -238,7 +258,13 @@ class Catalog:
         *,
         clips: Sequence[str] | None = None,
         cluster: int | str | None = None,
+        where: str | None = None,
         aligned: bool = False,
+        split: Mapping[str, float] | None = None,
+        group: str | Sequence[str] = (),
+        seed: int = 0,
+        shared_frames: bool = True,
+        card: bool = False,
         overwrite: bool = False,
     ) -> list[ExportedClip]:
         """Write motions as files that other programs read, lengths in the source's units.
@@ -247,16 +273,32 @@ class Catalog:
         ----------
         folder : path
             Made where it is missing.
-        format : {"bvh", "npz", "parquet"}
-            A BVH a clip; an NPZ a clip, see `motionary.pipeline.writers.npz`; or `frames.parquet` or
-            `aligned.parquet` for all, beside `clips.parquet` with their skeletons. A clip's file is
-            called by its clip_id, with the suffix replaced.
+        format : {"bvh", "npz", "csv", "parquet", "jsonl"}
+            A file a clip, called by its clip_id with the suffix replaced: BVH, NPZ or CSV, see
+            `motionary.pipeline.writers`. Or one for all: `frames.parquet` or `aligned.parquet`, beside
+            `clips.parquet` with their skeletons; `frames.jsonl` or `aligned.jsonl`, a line a clip.
         clips : sequence of str, optional
             Only these clips.
         cluster : int or str, optional
             Only the clips of the cluster of this number, or else of all clusters of this name.
+        where : str, optional
+            Only clips that fulfil this condition in SQL, see `where`.
         aligned : bool
             In the time of the cluster's reference instead of as captured.
+        split : mapping of str to float, optional
+            Shares of the clips by part, such as `{"train": 0.8, "test": 0.2}`: each part gets a folder. Clips
+            of one recording are never parted, see `motionary.catalog.kept_together`; parts come as near to
+            their shares as that allows, see `motionary.catalog.splits`.
+        group : str or sequence of str
+            Label columns, such as `subject`: a split does not part clips that agree in one of them.
+        seed : int
+            Another one gives another split.
+        shared_frames : bool
+            Whether clips that share a frame are of one recording; not so where drawn animations begin with
+            one rest pose.
+        card : bool
+            Write a data card beside the files, and a list of the clips, as is always done for a split:
+            `README.md`, `card.json`, `clips.jsonl`.
         overwrite : bool
             Replace files that are there.
 
@@ -268,61 +310,41 @@ class Catalog:
         Raises
         ------
         CatalogError
-            There is no such clip or cluster, nothing to export, a file that would be replaced, or the folder
-            is part of the library or cannot be written.
+            There is no such clip, cluster or column, nothing to export, a file that would be replaced, or the
+            folder is part of the library or cannot be written; the condition or the split cannot be used.
         """
         from motionary.catalog.export import write_export
         from motionary.catalog.export_plan import plan_export
 
         plan = plan_export(
-            self, folder, format, clips=clips, cluster=cluster, aligned=aligned, overwrite=overwrite
+            self,
+            folder,
+            format,
+            clips=clips,
+            cluster=cluster,
+            where=where,
+            aligned=aligned,
+            split=split,
+            group=group,
+            seed=seed,
+            shared_frames=shared_frames,
+            card=card,
+            overwrite=overwrite,
         )
         return list(write_export(plan))
 
-    def _create_views(self, connection: duckdb.DuckDBPyConnection) -> None:
-        filesystem = self.store.filesystem
-        if not isinstance(filesystem, LocalFileSystem):
-            connection.register_filesystem(filesystem)
-        for name in PUBLISHED:
-            if name not in self.snapshot.tables:
-                continue  # an older motionary published it
-            files = self.snapshot.tables[name]
-            listed = ", ".join(_sql_text(self.store.full_path(file)) for file in files)
-            connection.execute(f'create view "{name}" as from read_parquet([{listed}], union_by_name = true)')
-        # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.
-        home = _sql_text(self.store.full_path("").rstrip("/") + "/")
-        connection.execute(f"set allowed_directories = [{home}]")
-        connection.execute("set enable_external_access = false")
-        connection.execute("set lock_configuration = true")
+    def _motion(self, clip_id: str, aligned: bool) -> Motion:
+        known = self.clips.to_arrow()["clip_id"].to_pylist()
+        if clip_id not in known:
+            raise CatalogError(f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, known)}")
+        with closing(stream_motions(self, [clip_id], aligned)) as motions:
+            return next(motions)
 
-    def _clip(self, clip_id: str) -> dict:
-        table = self.clips.to_arrow()
-        rows = table.filter(pc.equal(table["clip_id"], clip_id)).to_pylist()
-        if not rows:
+    def _read_config(self) -> PipelineConfig:
+        try:
+            return config_of(self.settings)
+        except (TypeError, ValueError, KeyError) as error:
             raise CatalogError(
-                f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, table['clip_id'].to_pylist())}"
-            )
-        return rows[0]
-
-    def _motion(self, clip: dict, table: str, fps: float) -> Motion:
-        filesystem = self.store.filesystem
-        with named_if_damaged(f"a file of table {table} of {self.store.url}"):
-            rows = pa.concat_tables(
-                pq.read_table(
-                    self.store.path(file), filesystem=filesystem, filters=[("clip_id", "=", clip["clip_id"])]
-                )
-                for file in self.files(table)
-            )
-            return read_motion_rows(clip, rows, fps)
-
-
-def nearest(name: str, known: Sequence[str]) -> str:
-    """Ask whether one of the names most like an unknown one was meant; empty where none is like it."""
-    from difflib import get_close_matches
-
-    close = get_close_matches(name, known, n=3, cutoff=0.5)
-    return f"; did you mean {', '.join(close)}?" if close else ""
-
-
-def _sql_text(text: str) -> str:
-    return "'" + text.replace("'", "''") + "'"
+                f"the settings of {self.store.url} cannot be read by this motionary ({error}); make it with: "
+                f"motionary run LIBRARY {self.store.url}"
+            ) from error

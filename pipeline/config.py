@@ -6,8 +6,9 @@ A configuration is checked when it is made and never rewrites itself.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from motionary.pipeline.canonical import Convention
 from motionary.pipeline.joint_weights import joint_weights
@@ -232,6 +233,25 @@ class PipelineConfig:
     distances: DistanceConfig = field(default_factory=DistanceConfig)
     clusters: ClusterConfig = field(default_factory=ClusterConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+
+
+def config_of(settings: Mapping[str, Mapping[str, Any]]) -> PipelineConfig:
+    """Make the settings that `dataclasses.asdict` turned into plain values again.
+
+    Raises
+    ------
+    TypeError, ValueError
+        There is no such setting, or it is out of range.
+    """
+    features = dict(settings["features"])
+    features["conventions"] = tuple(Convention(**one) for one in features["conventions"])
+    return PipelineConfig(
+        ReadConfig(**settings["read"]),
+        FeatureConfig(**features),
+        DistanceConfig(**settings["distances"]),
+        ClusterConfig(**settings["clusters"]),
+        AlignmentConfig(**settings["alignment"]),
+    )
 
 
 def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:

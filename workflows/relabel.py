@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from motionary.catalog import Catalog
+from motionary.catalog.errors import nearest
 from motionary.catalog.labels import with_labels
-from motionary.catalog.query import nearest
 from motionary.catalog.snapshot import OVERVIEW, next_snapshot_id, publish
 from motionary.catalog.store import PartFacts, Store
 from motionary.catalog.views.overview import overview_page

@@ -1,0 +1,117 @@
+"""SQL over a catalog's tables: one DuckDB connection for as long as the catalog is open.
+
+A view is made when a query first names its table: the files of a table of many parts take longer to look at
+than most questions take to answer.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Mapping, Sequence
+
+import duckdb
+import pyarrow as pa
+from fsspec.implementations.local import LocalFileSystem
+
+from motionary.catalog.damage import damaged_file
+from motionary.catalog.errors import CatalogError
+from motionary.catalog.schema import PUBLISHED, SCHEMAS
+from motionary.catalog.snapshot import Snapshot
+from motionary.catalog.store import Store
+
+TAKES = "takes"
+"""The view of every clip with its cluster: `clips`, but for their skeletons, joined with `clusters`."""
+
+Parameters = Sequence[object] | Mapping[str, object]
+
+_JOINED = {TAKES: ("clips", "clusters")}
+
+
+class SqlSession:
+    """The tables of one snapshot as views that DuckDB can be asked about, and nothing else.
+
+    Parameters
+    ----------
+    store : Store
+    snapshot : Snapshot
+    """
+
+    def __init__(self, store: Store, snapshot: Snapshot) -> None:
+        self._store, self._snapshot = store, snapshot
+        self._made: set[str] = set()
+        self._lock = threading.Lock()
+        self._connection = duckdb.connect()
+        if not isinstance(store.filesystem, LocalFileSystem):
+            self._connection.register_filesystem(store.filesystem)
+        # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.
+        home = _text(store.full_path("").rstrip("/") + "/")
+        self._connection.execute(f"set allowed_directories = [{home}]")
+        self._connection.execute("set enable_external_access = false")
+        self._connection.execute("set lock_configuration = true")
+
+    def answer(self, query: str, parameters: Parameters | None = None) -> pa.Table:
+        """Answer one statement that selects; safe from any thread.
+
+        Raises
+        ------
+        CatalogError
+            The query is not valid, with DuckDB's message; or a file of the catalog is damaged.
+        """
+        try:
+            with self._connection.cursor() as cursor:
+                statements = cursor.extract_statements(query)
+                if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
+                    raise CatalogError("a catalog is only read: give one statement that selects")
+                self._make_views(_named_in(query))
+                return cursor.sql(query, params=parameters).to_arrow_table()
+        # RuntimeError: what DuckDB says of a damaged file can be no text.
+        except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
+            wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
+            damage = (
+                None if isinstance(error, wrong) else damaged_file(self._store, self._snapshot, PUBLISHED)
+            )
+            raise CatalogError(damage or f"the query cannot be answered: {error}") from error
+
+    def close(self) -> None:
+        """Give the connection's memory back."""
+        self._connection.close()
+
+    def _make_views(self, names: set[str]) -> None:
+        tables = {one for name in names for one in _JOINED.get(name, (name,))}
+        with self._lock:
+            for name in PUBLISHED:
+                # An older motionary may have published the catalog without some.
+                if name in tables - self._made and name in self._snapshot.tables:
+                    self._connection.execute(f'create view "{name}" as {self._reading(name)}')
+                    self._made.add(name)
+            if TAKES in names - self._made:
+                self._connection.execute(f"create view {TAKES} as {self._joining()}")
+                self._made.add(TAKES)
+
+    def _reading(self, table: str) -> str:
+        listed = ", ".join(_text(self._store.full_path(file)) for file in self._snapshot.tables[table])
+        # Parts of `clips` alone may differ in columns, those of labels.
+        by_name = "true" if table == "clips" else "false"
+        return f"from read_parquet([{listed}], union_by_name = {by_name})"
+
+    def _joining(self) -> str:
+        """Select clips with their clusters; skeletons, and labels called as a column there, are left out."""
+        taken = {"skeleton", *SCHEMAS["clusters"].names} - {"clip_id"}
+        own = ", ".join(quoted(one) for one in self._connection.table("clips").columns if one not in taken)
+        return f"select * from (select {own} from clips) join clusters using (clip_id)"
+
+
+def _named_in(query: str) -> set[str]:
+    """Find the views whose names a query holds, as tables or not; all of them where it holds none."""
+    known = {*PUBLISHED, *_JOINED}
+    return known & set(re.findall(r"\w+", query.lower())) or known
+
+
+def _text(text: str) -> str:
+    return "'" + text.replace("'", "''") + "'"
+
+
+def quoted(name: str) -> str:
+    """Write a name as SQL reads it, whatever it holds."""
+    return '"' + name.replace('"', '""') + '"'
