@@ -13,7 +13,7 @@ from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.layout import Earlier, Layout
-from motionary.pipeline.readers.library import FileState, KnownDigest
+from motionary.pipeline.readers.library import FileState, KnownDigest, KnownMembers
 from motionary.pipeline.task import MAKES
 
 
@@ -51,6 +51,25 @@ def known_digests(inputs: pa.Table) -> KnownDigest:
         for row in inputs.select(["files", "digest"]).to_pylist()
     }
     return lambda states: known.get(tuple(_storable(state) for state in states))
+
+
+def known_members(inputs: pa.Table) -> KnownMembers:
+    """Return who knows what clips lie in zips that were not touched since the run of these inputs."""
+    inputs = inputs.filter(pc.greater(pc.list_value_length(inputs["files"]), 0))
+    by_state: dict[tuple[int, ...], list[list[str]]] = {}
+    for files in inputs["files"].to_pylist():
+        by_state.setdefault(_touched(FileState(**files[0])), []).append([one["path"] for one in files])
+
+    def members(archive: FileState) -> list[tuple[str, ...]]:
+        inside = f"{_text(archive.path)}/"
+        clips = [paths for paths in by_state.get(_touched(archive), ()) if paths[0].startswith(inside)]
+        return [tuple(one.removeprefix(inside) for one in paths) for paths in clips]
+
+    return members
+
+
+def _touched(state: FileState) -> tuple[int, int, int, int]:
+    return state.size, state.mtime_ns, state.ctime_ns, state.inode
 
 
 def inputs_table(layout: Layout) -> pa.Table:

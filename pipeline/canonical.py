@@ -69,8 +69,9 @@ class Convention:
     name : str
         What the convention is called.
     joints : mapping of str to str
-        For each canonical joint the skeleton's joint. Names are compared without case and without a
-        namespace (`mixamorig:Hips` is `hips`).
+        For each canonical joint the skeleton's joint, or the markers that it is the mean of, see
+        `motionary.pipeline.readers.markers`. Names are compared without case and without a namespace
+        (`mixamorig:Hips` is `hips`).
 
     Raises
     ------
@@ -111,7 +112,7 @@ def find_convention(joint_names: Sequence[str], extra: Iterable[Convention] = ()
     UnknownSkeletonError
         None does; the message has the joint names and the nearest convention.
     """
-    known = {_plain(name) for name in joint_names}
+    known = {plain_name(name) for name in joint_names}
     conventions = (*extra, *CONVENTIONS)
     for convention in conventions:
         if not _missing(convention, known):
@@ -129,19 +130,22 @@ def canonical_indices(skeleton: Skeleton, convention: Convention) -> np.ndarray:
     """Return the indices (19,) of a skeleton's joints in the order of `CANONICAL_JOINTS`."""
     place: dict[str, int] = {}
     for index, name in enumerate(skeleton.names):
-        place.setdefault(_plain(name), index)
-    return np.array([place[_plain(convention.joints[joint])] for joint in CANONICAL_JOINTS], dtype=np.intp)
+        place.setdefault(plain_name(name), index)
+    return np.array(
+        [place[plain_name(convention.joints[joint])] for joint in CANONICAL_JOINTS], dtype=np.intp
+    )
 
 
 _NAMESPACE = re.compile(r"^(?:.*:)?(?:mixamorig\d*_|character\d+_)?", re.IGNORECASE)
 
 
-def _plain(name: str) -> str:
+def plain_name(name: str) -> str:
+    """Return a joint's or a marker's name as it is compared: without case and namespace."""
     return _NAMESPACE.sub("", name).lower()
 
 
 def _missing(convention: Convention, known: set[str]) -> list[str]:
-    return [name for name in convention.joints.values() if _plain(name) not in known]
+    return [name for name in convention.joints.values() if plain_name(name) not in known]
 
 
 def _convention(
@@ -203,6 +207,14 @@ CONVENTIONS: tuple[Convention, ...] = (
         "LeftHip LeftKnee LeftAnkle LeftToe",
         _HUMAN_SIDES,
     ),
+    # The segments of Xsens MVN, each named at its start: a shoulder is the collarbone, a foot the ankle.
+    _convention(
+        "xsens-mvn",
+        "Pelvis L3 T8 Neck Head",
+        "LeftUpperArm LeftForeArm LeftHand",
+        "LeftUpperLeg LeftLowerLeg LeftFoot LeftToe",
+        _HUMAN_SIDES,
+    ),
     _convention(
         "smpl",
         "Pelvis Spine1 Spine3 Neck Head",
@@ -231,4 +243,6 @@ CONVENTIONS: tuple[Convention, ...] = (
         "thigh_l calf_l foot_l ball_l",
         ("_l$", "_r"),
     ),
+    # What readers make of markers.
+    Convention("canonical", {joint: joint for joint in CANONICAL_JOINTS}),
 )

@@ -29,7 +29,7 @@ class ReadConfig:
     position_rule : {"add", "replace"}, optional
         Whether a BVH's position channels are added to the OFFSET or replace it; found out by default.
     up : {"y", "z"}
-        The source's vertical axis.
+        The vertical axis of BVH and AMC; other formats say it.
     unit : float, optional
         Metres in one source unit.
     keep_first_frame : bool

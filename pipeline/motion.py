@@ -6,6 +6,9 @@ format one came from. The conventions, each named with its rival:
 - world: right-handed, **Y up** (not Z up); a figure facing +Z has its left side at +X
 - quaternions: **x, y, z, w** (scipy's order, not w first), unit length, local to the parent joint
 - one joint translates: the root, which is the pelvis; every other joint keeps a constant offset
+
+A motion of markers (C3D) has places instead of rotations: nobody measured how its joints are turned, and
+nothing here makes that up. Its `rotations` are of no joint, and `places` tells where the joints are.
 """
 
 from __future__ import annotations
@@ -109,6 +112,10 @@ class Motion:
         The file the motion was read from, or what made it.
     notes : tuple of str
         What the reader changed or assumed, for a person to read.
+    places : array (T, J, 3), optional
+        Of a motion of markers: each joint seen from the root along the world's axes, in source units, 0 for
+        the root. `rotations` is then (T, 0, 4), and the skeleton's offsets say no more than how long the
+        bones are.
 
     Raises
     ------
@@ -124,15 +131,17 @@ class Motion:
     unit: float | None = None
     source: str = ""
     notes: tuple[str, ...] = field(default=())
+    places: FloatArray | None = None
 
     def __post_init__(self) -> None:
         root = np.asarray(self.root_position, dtype=np.float64)
         rotations = np.asarray(self.rotations, dtype=np.float64)
         frames, joints = len(root), len(self.skeleton.names)
-        if root.shape != (frames, 3) or rotations.shape != (frames, joints, 4):
+        turned = 0 if self.places is not None else joints
+        if root.shape != (frames, 3) or rotations.shape != (frames, turned, 4):
             raise ValueError(
                 f"root_position has shape {root.shape} and rotations {rotations.shape}; "
-                f"this skeleton needs (T, 3) and (T, {joints}, 4) with one T"
+                f"this skeleton needs (T, 3) and (T, {turned}, 4) with one T"
             )
         if frames == 0:
             raise ValueError(f"motion {self.name!r} has no frames")
@@ -145,10 +154,22 @@ class Motion:
             raise ValueError(f"motion {self.name!r} holds a quaternion of length zero")
         object.__setattr__(self, "root_position", root)
         object.__setattr__(self, "rotations", rotations / norms)
+        if self.places is not None:
+            object.__setattr__(self, "places", self._checked_places(frames, joints))
+
+    def _checked_places(self, frames: int, joints: int) -> FloatArray:
+        places = np.asarray(self.places, dtype=np.float64)
+        if places.shape != (frames, joints, 3):
+            raise ValueError(f"places have shape {places.shape}; this motion needs ({frames}, {joints}, 3)")
+        if not np.isfinite(places).all() or places[:, 0].any():
+            raise ValueError(
+                f"motion {self.name!r} holds a place that is not a number, or a root beside itself"
+            )
+        return places
 
     def __repr__(self) -> str:
-        joints = len(self.skeleton.names)
-        return f"<Motion {self.name!r}: {self.frames} frames at {self.fps:g} a second, {joints} joints>"
+        joints = f"{len(self.skeleton.names)} joints{'' if self.places is None else ' of markers'}"
+        return f"<Motion {self.name!r}: {self.frames} frames at {self.fps:g} a second, {joints}>"
 
     @property
     def frames(self) -> int:
@@ -161,13 +182,15 @@ class Motion:
         return (self.frames - 1) / self.fps
 
     def positions(self) -> FloatArray:
-        """Place every joint in the world: forward kinematics.
+        """Place every joint in the world: by forward kinematics, or as its markers were.
 
         Returns
         -------
         array (T, J, 3)
             Joint positions in source units.
         """
+        if self.places is not None:
+            return self.root_position[:, None] + self.places
         skeleton = self.skeleton
         frames, joints = self.rotations.shape[:2]
         local = Rotation.from_quat(self.rotations.reshape(-1, 4)).as_matrix().reshape(frames, joints, 3, 3)
@@ -181,7 +204,7 @@ class Motion:
         return place
 
     def sampled(self, frame_times: FloatArray) -> Motion:
-        """Show the motion at fractional frames: slerp for rotations, linear for the root.
+        """Show the motion at fractional frames: slerp for rotations, linear for places.
 
         Parameters
         ----------
@@ -209,6 +232,10 @@ class Motion:
         after = np.minimum(before + 1, self.frames - 1)
         share = times - before
         root = (1 - share)[:, None] * self.root_position[before] + share[:, None] * self.root_position[after]
+        if self.places is not None:
+            part = share[:, None, None]
+            places = (1 - part) * self.places[before] + part * self.places[after]
+            return replace(self, root_position=root, rotations=np.empty((len(root), 0, 4)), places=places)
         rotations = self.rotations[before]
         between = np.flatnonzero(share)  # on a frame there is nothing to turn
         rotations[between] = slerp(rotations[between], self.rotations[after[between]], share[between, None])

@@ -78,6 +78,9 @@ REAL = {
     "xsens": """Hips Chest Chest2 Chest3 Chest4 Neck Head RightCollar RightShoulder RightElbow RightWrist
         LeftCollar LeftShoulder LeftElbow LeftWrist RightHip RightKnee RightAnkle RightToe
         LeftHip LeftKnee LeftAnkle LeftToe""",
+    "xsens-mvn": """Pelvis L5 L3 T12 T8 Neck Head RightShoulder RightUpperArm RightForeArm RightHand
+        LeftShoulder LeftUpperArm LeftForeArm LeftHand RightUpperLeg RightLowerLeg RightFoot RightToe
+        LeftUpperLeg LeftLowerLeg LeftFoot LeftToe""",
     "smpl": """Pelvis L_Hip R_Hip Spine1 L_Knee R_Knee Spine2 L_Ankle R_Ankle Spine3 L_Foot R_Foot Neck
         L_Collar R_Collar Head L_Shoulder R_Shoulder L_Elbow R_Elbow L_Wrist R_Wrist L_Hand R_Hand""",
     "smpl-x": """pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3

@@ -11,7 +11,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from motionary.catalog import CatalogError
-from motionary.catalog.earlier import earlier_run, inputs_table, known_digests, published_inputs
+from motionary.catalog.earlier import (
+    earlier_run,
+    inputs_table,
+    known_digests,
+    known_members,
+    published_inputs,
+)
 from motionary.catalog.labels import following
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import CURRENT, Snapshot, current_snapshot
@@ -19,7 +25,7 @@ from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
 from motionary.pipeline.layout import lay_out
-from motionary.pipeline.readers.library import KnownDigest, Source, scan_library
+from motionary.pipeline.readers.library import KnownDigest, KnownMembers, Source, scan_library
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.workflows.computation import StoredParts
 from motionary.workflows.errors import UserError
@@ -90,7 +96,7 @@ def prepare(job: Job) -> Prepared:
     before = current_snapshot(store)
     then = published_inputs(store, before)
     roots = [os.path.abspath(library) for library in job.libraries]  # noqa: PTH100 - keeps a link's own name
-    sources = library_sources(roots, known_digests(then))
+    sources = library_sources(roots, known_digests(then), known_members(then))
     wanted = job.config.clusters.n_clusters
     if wanted is not None and wanted > len(sources):
         raise UserError(f"{wanted} clusters are asked for, and the library holds {len(sources)} clips")
@@ -139,7 +145,11 @@ def _stale_labels(
     return {name: now[one] for name, one in clip_ids.items() if one is not None}
 
 
-def library_sources(roots: Sequence[str], known_digest: KnownDigest = lambda states: None) -> list[Source]:
+def library_sources(
+    roots: Sequence[str],
+    known_digest: KnownDigest = lambda states: None,
+    known_members: KnownMembers = lambda state: (),
+) -> list[Source]:
     """List the clips of libraries.
 
     Raises
@@ -148,7 +158,7 @@ def library_sources(roots: Sequence[str], known_digest: KnownDigest = lambda sta
         A library is missing or holds no clip.
     """
     try:
-        return scan_library(roots, known_digest)
+        return scan_library(roots, known_digest, known_members)
     except (OSError, ValueError) as error:
         raise UserError(str(error)) from error
 

@@ -2,30 +2,36 @@
 
 A clip's name is its file's path in the library, suffix included, with `/`; where several roots are
 watched, the root folder's name goes before it. It does not change when other files come or go. Hidden files
-and folders, and files of other types, are passed over; an ASF is no clip but belongs to the clips that are
-read with it. Links to folders are not followed.
+and folders and files of other types are passed over, as are the bodies that AMASS keeps beside its motions
+(`shape.npz`, `*_stagei.npz`); an ASF is no clip but belongs to the clips that are read with it. Links to
+folders are not followed. A zip is a folder, see `motionary.pipeline.readers.zipped`; one that cannot be
+opened is a clip that cannot be read.
 
 A file whose size, times and inode are what they were need not be read to know its digest, as in git: times
-tell nothing only of a file that was changed within `_SETTLED` seconds of being looked at.
+tell nothing only of a file that was changed within `_SETTLED` seconds of being looked at. What lies in a zip
+has the zip's size and times.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from hashlib import blake2b
 from itertools import pairwise
 from pathlib import Path
 
 from motionary.pipeline.readers.amc import find_skeleton, skeletons_in
-from motionary.pipeline.readers.text import is_special
+from motionary.pipeline.readers.digests import digest_of
+from motionary.pipeline.readers.errors import ReadError
+from motionary.pipeline.readers.zipped import Member, archive_of, members_of
 
-FORMATS = {".bvh": "bvh", ".amc": "asf/amc"}
+FORMATS = {".bvh": "bvh", ".amc": "asf/amc", ".c3d": "c3d", ".npz": "amass", ".zip": "zip"}
 
 Root = str | os.PathLike[str]
 
+_NO_CLIP = re.compile(r"^\.|(^|_)(shape|stagei)\.npz$", re.IGNORECASE)  # AMASS keeps bodies beside motions
 _SETTLED = 2.0  # seconds: the coarsest times that file systems in use keep (FAT)
 
 
@@ -36,6 +42,7 @@ class FileState:
     Parameters
     ----------
     path : str
+        Of what lies in a zip, the zip's with the name in it; the rest is the zip's.
     size : int
         Bytes.
     mtime_ns, ctime_ns : int
@@ -66,9 +73,9 @@ class Source:
         Every file it is read from: itself, then an AMC's ASF where there is one.
     digest : str
         BLAKE2b, 128 bits, in hexadecimal, over the lengths and contents of `files`; empty where one cannot be
-        opened (reading the clip then says why).
+        opened (reading the clip then says why). What is refused in a zip counts by its entry there.
     format : str
-        "bvh" or "asf/amc".
+        A value of `FORMATS`; "zip" is one that cannot be opened.
     states : tuple of FileState
         Of `files`, when they were digested; empty where one cannot be told from a file that changes again.
     """
@@ -85,9 +92,14 @@ class Source:
 KnownDigest = Callable[[tuple[FileState, ...]], str | None]
 """Given the states of a clip's files, their digest where it is known."""
 
+KnownMembers = Callable[[FileState], Sequence[tuple[str, ...]]]
+"""Given the state of a zip, the names in it of the files of each of its clips; none where it is not known."""
+
 
 def scan_library(
-    roots: Root | Sequence[Root], known_digest: KnownDigest = lambda states: None
+    roots: Root | Sequence[Root],
+    known_digest: KnownDigest = lambda states: None,
+    known_members: KnownMembers = lambda state: (),
 ) -> list[Source]:
     """List the clips under one root or several.
 
@@ -97,6 +109,8 @@ def scan_library(
         Folders, searched to any depth, or single files.
     known_digest : callable
         Asked before files are read for their digest.
+    known_members : callable
+        Asked before a zip is opened for its list of files.
 
     Returns
     -------
@@ -124,7 +138,7 @@ def scan_library(
     sources = [
         source
         for folder, prefix in zip(folders, prefixes, strict=True)
-        for source in _sources_under(folder, prefix, known_digest)
+        for source in _sources_under(folder, prefix, known_digest, known_members)
     ]
     if not sources:
         places = ", ".join(map(str, folders))
@@ -153,32 +167,67 @@ def _prefixes(folders: Sequence[Path]) -> list[str]:
     return [f"{name}/" if folder.is_dir() else "" for name, folder in zip(names, folders, strict=True)]
 
 
-def _sources_under(root: Path, prefix: str, known_digest: KnownDigest) -> Iterator[Source]:
+def _sources_under(
+    root: Path, prefix: str, known_digest: KnownDigest, known_members: KnownMembers
+) -> Iterator[Source]:
+    folder = root if root.is_dir() else root.parent
+    for path, skeletons in _files_under(root):
+        for files in _clips_of(path, skeletons, known_members):
+            yield _source(files, folder, prefix, known_digest)
+
+
+def _files_under(root: Path) -> Iterator[tuple[Path, Sequence[Path]]]:
+    """Find files that are clips or hold some, each with the ASF files beside it."""
     if root.is_file():
         if root.suffix.lower() in FORMATS:
-            yield _source(root, root.parent, prefix, skeletons_in(root.parent), known_digest)
+            yield root, skeletons_in(root.parent)
         return
     for folder, folders, names in os.walk(root, onerror=_refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
-        paths = [Path(folder, name) for name in names if not name.startswith(".")]
+        paths = [Path(folder, name) for name in names if not _NO_CLIP.search(name)]
         skeletons = [path for path in paths if path.suffix.lower() == ".asf"]
-        for path in paths:
-            if path.suffix.lower() in FORMATS:
-                yield _source(path, root, prefix, skeletons, known_digest)
+        yield from ((path, skeletons) for path in paths if path.suffix.lower() in FORMATS)
 
 
-def _source(
-    path: Path, root: Path, prefix: str, skeletons: Sequence[Path], known_digest: KnownDigest
-) -> Source:
-    files = [path]
-    kind = FORMATS[path.suffix.lower()]
-    skeleton = find_skeleton(path.stem, skeletons) if kind == "asf/amc" else None
-    if skeleton is not None:
-        files.append(skeleton)
-    place = os.fsencode(path.relative_to(root).as_posix()).decode("utf-8", "backslashreplace")
+def _clips_of(path: Path, skeletons: Sequence[Path], known_members: KnownMembers) -> list[tuple[Path, ...]]:
+    """List the files of each clip that a file is or holds."""
+    if path.suffix.lower() != ".zip":
+        return [_with_skeleton(path, skeletons)]
+    states = _states((str(path),))
+    known = known_members(states[0]) if states else ()
+    if known:
+        return [tuple(path / name for name in names) for names in known]
+    try:
+        members = members_of(path)
+    except ReadError:
+        return [(path,)]
+    beside: dict[Path, list[Path]] = {}
+    for name in members:
+        if name.lower().endswith(".asf"):
+            beside.setdefault((path / name).parent, []).append(path / name)
+    clips = [path / name for name, member in members.items() if _is_clip(member)]
+    return [_with_skeleton(clip, sorted(beside.get(clip.parent, ()))) for clip in clips]
+
+
+def _is_clip(member: Member) -> bool:
+    *folders, name = re.split(r"[/\\]", member.info.orig_filename)
+    hidden = any(one == "__MACOSX" or (one.startswith(".") and one.strip(".")) for one in folders)
+    suffix = Path(name).suffix.lower()
+    return not hidden and not _NO_CLIP.search(name) and suffix != ".zip" and suffix in FORMATS
+
+
+def _with_skeleton(path: Path, skeletons: Sequence[Path]) -> tuple[Path, ...]:
+    amc = FORMATS[path.suffix.lower()] == "asf/amc"
+    skeleton = find_skeleton(path.stem, skeletons) if amc else None
+    return (path,) if skeleton is None else (path, skeleton)
+
+
+def _source(files: Sequence[Path], root: Path, prefix: str, known_digest: KnownDigest) -> Source:
+    place = os.fsencode(files[0].relative_to(root).as_posix()).decode("utf-8", "backslashreplace")
     names = tuple(map(str, files))
     states = _states(names)
     digest = (known_digest(states) if states else None) or digest_of(names)
+    kind = FORMATS[files[0].suffix.lower()]
     return Source(prefix + place, place, str(root), names, digest, kind, states)
 
 
@@ -186,8 +235,9 @@ def _states(files: Sequence[str]) -> tuple[FileState, ...]:
     """Look at files that are about to be digested; nothing where one changed so lately that it may again."""
     states = []
     for file in files:
+        inside = archive_of(file)
         try:
-            seen = Path(file).stat()
+            seen = (inside[0] if inside else Path(file)).stat()
         except OSError:
             return ()
         if max(seen.st_mtime, seen.st_ctime) > time.time() - _SETTLED:
@@ -201,18 +251,3 @@ def _refuse(error: OSError) -> None:
     raise PermissionError(
         f"{error.filename} cannot be listed ({error.strerror}); check its permissions"
     ) from error
-
-
-def digest_of(files: Sequence[str]) -> str:
-    """Digest the contents of files, each with its length; empty where one cannot be opened."""
-    digest = blake2b(digest_size=16)
-    try:
-        for file in files:
-            if is_special(Path(file)):
-                return ""
-            content = Path(file).read_bytes()
-            digest.update(len(content).to_bytes(8, "little"))
-            digest.update(content)
-    except OSError:
-        return ""
-    return digest.hexdigest()

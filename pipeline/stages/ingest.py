@@ -15,7 +15,8 @@ from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.features import FrameFeatures, frame_features
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import ReadError, read_motion
-from motionary.pipeline.readers.library import Source, digest_of
+from motionary.pipeline.readers.digests import digest_of
+from motionary.pipeline.readers.library import Source
 from motionary.pipeline.stages.columns import carried_rows, renamed, vectors
 from motionary.pipeline.stages.motions import motion_rows, skeleton_record
 from motionary.pipeline.tables import TABLES
@@ -69,7 +70,8 @@ def _read(source: Source, config: PipelineConfig) -> Tables:
         return _ingest_one(source, config)
     except (ReadError, SkeletonError) as error:
         line = error.line if isinstance(error, ReadError) else None
-        passing = isinstance(error.__cause__, OSError) or digest_of(source.files) != source.digest
+        passing = isinstance(error.__cause__, OSError | ImportError)  # a package that is not installed yet
+        passing = passing or digest_of(source.files) != source.digest
         return {"quarantine": _quarantined(source, line, error.what, error.mend, retry=passing)}
     except Exception as error:  # one file that meets a fault of ours must not stop the job, nor hide it
         place = traceback.extract_tb(error.__traceback__)[-1]
@@ -91,7 +93,8 @@ def _named(tables: Tables, source: Source) -> Tables:
 
 def _ingest_one(source: Source, config: PipelineConfig) -> dict[str, pa.Table]:
     skeleton = source.files[1] if len(source.files) > 1 else None
-    motion = read_motion(source.files[0], skeleton=skeleton, **asdict(config.read))
+    own = config.features.conventions
+    motion = read_motion(source.files[0], skeleton=skeleton, conventions=own, **asdict(config.read))
     if digest_of(source.files) != source.digest:
         raise ReadError(source.files[0], None, "it changed while the run was reading it", "run again")
     features = frame_features(motion, config.features)

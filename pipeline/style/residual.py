@@ -24,6 +24,7 @@ from motionary.pipeline.style.rig import (
     REGIONS,
     is_one_rig,
     joint_regions,
+    refuse_markers,
     rig_difference,
 )
 from motionary.pipeline.style.root_motion import RootMotion, features_by_frame, root_motion, without_heading
@@ -146,7 +147,7 @@ def residuals(
     reference : Motion
         m frames.
     kind : {"rotations", "pose"}, optional
-        Rotations where all are of one rig with the reference, else pose.
+        Rotations where all are of one rig with the reference and none is of markers, else pose.
     conventions : sequence of Convention
         A user's own joint-name conventions.
 
@@ -158,12 +159,15 @@ def residuals(
     Raises
     ------
     ValueError
-        Frames or rates differ, rotations are asked for and the skeletons differ, or there is no such kind.
+        Frames or rates differ, rotations are asked for and the skeletons differ or a motion is of markers, or
+        there is no such kind.
     SkeletonError
         No convention fits a skeleton, or it has no legs.
     """
     if kind not in (None, "rotations", "pose"):
         raise ValueError(f"kind is {kind!r}; it must be 'rotations' or 'pose'")
+    if kind == "rotations":
+        refuse_markers([reference, *aligned])
     others = [one for one in aligned if not is_one_rig(one.skeleton, reference.skeleton)]
     if kind == "rotations" and others:
         raise ValueError(
@@ -171,7 +175,8 @@ def residuals(
         )
     for one in aligned:
         check_same_time(one, reference)
-    subtract = _pose_residual if kind == "pose" or others else _rotation_residual
+    unturned = any(one.places is not None for one in (reference, *aligned))
+    subtract = _pose_residual if kind == "pose" or others or unturned else _rotation_residual
     to = _seen(reference, conventions)
     return [subtract(_seen(one, conventions), to, conventions) for one in aligned]
 

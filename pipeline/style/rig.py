@@ -33,6 +33,21 @@ def is_one_rig(first: Skeleton, second: Skeleton) -> bool:
     return first.names == second.names and first.parents == second.parents
 
 
+def refuse_markers(motions: Iterable[Motion]) -> None:
+    """Check that motions have rotations.
+
+    Raises
+    ------
+    ValueError
+        One is of markers; it names that.
+    """
+    for motion in motions:
+        if motion.places is not None:
+            raise ValueError(
+                f"{motion.name!r} was captured as markers: it has places of joints and no rotations"
+            )
+
+
 def rig_difference(first: Motion, second: Motion) -> str:
     """Say how two motions' skeletons differ: their names and numbers of joints, and the first difference."""
     names = first.skeleton.names, second.skeleton.names

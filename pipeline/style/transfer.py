@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from motionary.pipeline.canonical import Convention
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.style.residual import check_same_time
-from motionary.pipeline.style.rig import is_one_rig, rig_difference
+from motionary.pipeline.style.rig import is_one_rig, refuse_markers, rig_difference
 from motionary.pipeline.style.root_motion import (
     RootMotion,
     about_vertical,
@@ -58,10 +58,11 @@ def transfer(
     Raises
     ------
     ValueError
-        Frames or rates differ, or the skeletons do; bones may differ in length.
+        Frames or rates differ, or the skeletons do; bones may differ in length. Or one is of markers.
     SkeletonError
         No convention fits the skeleton, or it has no legs.
     """
+    refuse_markers((styled, reference, onto))
     for motion in (styled, onto):
         check_same_time(motion, reference)
         if not is_one_rig(motion.skeleton, reference.skeleton):

@@ -40,11 +40,16 @@ def write_bvh(motion: Motion, path: str | os.PathLike[str], *, rotation_order: s
     Raises
     ------
     ValueError
-        `rotation_order` is not an order of X, Y and Z, or a joint's name cannot stand in a BVH. Blanks in
-        names become underscores; two names may not become equal by that.
+        The motion is of markers, `rotation_order` is not an order of X, Y and Z, or a joint's name cannot
+        stand in a BVH. Blanks in names become underscores; two names may not become equal by that.
     """
     if sorted(rotation_order.upper()) != ["X", "Y", "Z"]:
         raise ValueError(f"rotation_order is {rotation_order!r}; it must be an order of XYZ, such as 'ZXY'")
+    if motion.places is not None:
+        raise ValueError(
+            f"{motion.name!r} was captured as markers: it has places of joints and no rotations, "
+            "and a BVH is made of rotations; write it as NPZ or Parquet"
+        )
     i, j, k = ("XYZ".index(axis) for axis in rotation_order.upper())
     names = _plain_names(motion.skeleton.names)
     lines = [*_hierarchy(motion, names, rotation_order.upper()), *_frames(motion, (i, j, k))]

@@ -100,7 +100,7 @@ def test_paths_that_lead_nowhere(tmp_path: Path) -> None:
         with pytest.raises(ReadError, match=what) as caught:
             read_motion(tmp_path / name)
         assert caught.value.line is None
-    with pytest.raises(ReadError, match=re.escape(".amc and .bvh")):
+    with pytest.raises(ReadError, match=re.escape(".amc, .bvh")):
         read_motion(tmp_path / "a.fbx")
 
 
