@@ -113,15 +113,21 @@ def _compile_in_this_process() -> None:
 
 
 def _call_every_kernel() -> None:
-    """Call what the main job calls, with its types: features are float32, condensed distances float64."""
+    """Call what runs and questions call, with their types: features float32, condensed distances float64."""
     from motionary.pipeline.alignment import cotw, cotw_search
     from motionary.pipeline.clustering import complete_linkage, fuzzy_linkage
     from motionary.pipeline.distances import compare_clips, pairwise_distances
+    from motionary.pipeline.distances.explain import explain_pair, feature_parts
+    from motionary.pipeline.distances.nearest import nearest_clips, pack_library
+    from motionary.pipeline.distances.subsequence import find_occurrences, pack_takes
 
     random = np.random.default_rng(0)
     clips = [random.random((10, 59), dtype=np.float32) for _ in range(3)]
     pairs = pairwise_distances(clips, n_jobs=1)
     compare_clips(clips[:2], clips[2:])
+    nearest_clips(clips[0], pack_library(clips))
+    explain_pair(clips[0], clips[1], feature_parts("pose+travel"))
+    find_occurrences(clips[0], pack_takes(clips), 1)
     complete_linkage(pairs.weighted)
     fuzzy_linkage(pairs.fuzzy_low, pairs.fuzzy_high)
     cotw(clips[0], clips[1], segment_length=5, slack=1)

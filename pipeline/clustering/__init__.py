@@ -1,4 +1,9 @@
-"""Hierarchical clustering: linkage, where to cut, and what the clusters are called [DC 5]."""
+"""Hierarchical clustering: linkage, where to cut, and what the clusters are called [DC 5].
+
+The estimator stands on scikit-learn, which takes a second to import; so it is imported when it is asked for.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from motionary.pipeline.clustering.choice import Cut, CutRule, choose_cut
 from motionary.pipeline.clustering.cut import (
@@ -19,11 +24,15 @@ from motionary.pipeline.clustering.linkage import (
 from motionary.pipeline.clustering.modularity import modularity_cut, nearest_neighbour_graph
 from motionary.pipeline.clustering.naming import LabelSource, Names, name_clusters
 
+if TYPE_CHECKING:
+    from motionary.pipeline.clustering.estimator import MotionClusterer
+
 __all__ = [
     "Cut",
     "CutRule",
     "LabelSource",
     "LevelScores",
+    "MotionClusterer",
     "Names",
     "Strip",
     "average_linkage",
@@ -41,3 +50,11 @@ __all__ = [
     "ward_linkage",
     "widest_strip",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name != "MotionClusterer":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from motionary.pipeline.clustering.estimator import MotionClusterer
+
+    return MotionClusterer

@@ -177,7 +177,7 @@ def _compute_within(
 def _among(values: Values, some: NDArray[np.intp], clips: Sequence[NDArray], config: DistanceConfig) -> None:
     from motionary.pipeline.distances import pairwise_distances
 
-    found = pairwise_distances([clips[k] for k in some], n_jobs=1, thresholds=_thresholds(config))
+    found = pairwise_distances([clips[k] for k in some], n_jobs=1, thresholds=thresholds_of(config))
     i, j = np.triu_indices(len(some), 1)
     for name, value in values.items():
         value[some[i], some[j]] = value[some[j], some[i]] = getattr(found, name)
@@ -195,12 +195,13 @@ def _compare(
 
     if not (len(rows) and len(columns)):
         return
-    found = compare_clips([clips[k] for k in rows], [others[k] for k in columns], _thresholds(config))
+    found = compare_clips([clips[k] for k in rows], [others[k] for k in columns], thresholds_of(config))
     for name in values:
         values[name][np.ix_(rows, columns)] = getattr(found, name)
 
 
-def _thresholds(config: DistanceConfig) -> tuple[float, ...]:
+def thresholds_of(config: DistanceConfig) -> tuple[float, ...]:
+    """Return the lambdas of the curve that these settings mean."""
     from motionary.pipeline.distances import THRESHOLDS, random_thresholds
 
     return THRESHOLDS if config.thresholds == "midpoints" else random_thresholds(config.seed)
