@@ -1,11 +1,15 @@
 """Motions leave a catalog as files that others read, whole, and without surprises."""
 
+import json
 import shutil
 import unicodedata
+from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -13,18 +17,21 @@ import pybvh
 import pytest
 
 from motionary.catalog import Catalog, CatalogError, export
-from motionary.catalog.export_plan import file_names, plan_export
+from motionary.catalog.export_files import file_names
+from motionary.catalog.export_plan import plan_export
 from motionary.catalog.schema import PUBLISHED, SCHEMAS
 from motionary.catalog.snapshot import Snapshot, publish
 from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import read_motion
+from motionary.pipeline.writers import motion_line, write_csv
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 
 WALK = "walk/walk_tired_alex_01.bvh"
 SUBSTEPS = 4
+HALVES = {"train": 0.5, "test": 0.5}
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +64,10 @@ def hdm05(shared_data, silent_progress, tmp_path_factory) -> Catalog:
 
 def leg_lengths(catalog: Catalog) -> dict[str, float]:
     return {row["clip_id"]: row["leg_length"] for row in catalog.clips.to_arrow().to_pylist()}
+
+
+def lines_of(file: Path) -> list[dict]:
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").split("\n")[:-1]]
 
 
 def apart(read: Motion, written: Motion) -> float:
@@ -141,6 +152,131 @@ def test_an_npz_is_documented_arrays_without_pickle(demo, tmp_path):
         assert np.isnan(arrays["unit"])
 
 
+def test_a_csv_is_a_row_a_frame(demo, tmp_path):
+    (one,) = demo.export(tmp_path, "csv", clips=[WALK], aligned=True)
+    assert one.path == tmp_path / "walk" / "walk_tired_alex_01.csv"
+    motion, table = demo.aligned(WALK), pd.read_csv(one.path)
+    assert list(table.columns[:5]) == [
+        "frame",
+        "seconds",
+        *(f"{a}.{motion.skeleton.names[0]}" for a in "xyz"),
+    ]
+    np.testing.assert_array_equal(table["frame"], np.arange(motion.frames))
+    np.testing.assert_allclose(table["seconds"], np.arange(motion.frames) / 30)
+    for axes, values in (("xyz", motion.positions()), (("qx", "qy", "qz", "qw"), motion.rotations)):
+        names = [f"{axis}.{joint}" for joint in motion.skeleton.names for axis in axes]
+        numbers = table[names].to_numpy(np.float32).reshape(values.shape)
+        np.testing.assert_array_equal(numbers, values.astype(np.float32))
+    assert table.shape[1] == 2 + 7 * len(motion.skeleton.names)
+
+
+def test_a_motion_of_markers_is_written_without_rotations(demo, tmp_path):
+    motion = demo.motion(WALK)
+    places = motion.positions() - motion.root_position[:, None]
+    markers = replace(motion, rotations=np.empty((motion.frames, 0, 4)), places=places)
+    write_csv(markers, tmp_path / "markers.csv")
+    table = pd.read_csv(tmp_path / "markers.csv")
+    assert list(table.columns[2:]) == [f"{axis}.{name}" for name in motion.skeleton.names for axis in "xyz"]
+    np.testing.assert_allclose(table.iloc[:, -3:], motion.positions()[:, -1], rtol=1e-6, atol=1e-6)
+    line = json.loads(motion_line(markers, {"split": "train"}))
+    assert (line["rotations"], line["split"]) == (None, "train")
+    np.testing.assert_allclose(line["positions"], motion.positions(), atol=1e-6)
+
+
+def test_no_column_of_a_csv_begins_like_a_formula(demo, tmp_path):
+    motion = demo.motion(WALK)
+    names = ("=1+1", "+a", "-b", "@c", 'a,"b"\n', *motion.skeleton.names[5:])
+    odd = replace(motion, skeleton=replace(motion.skeleton, names=names))
+    write_csv(odd, tmp_path / "odd.csv")
+    table = pd.read_csv(tmp_path / "odd.csv")
+    assert list(table.columns[2:18:3]) == ["x.=1+1", "x.+a", "x.-b", "x.@c", 'x.a,"b"\n', f"x.{names[5]}"]
+
+
+def test_jsonl_is_a_line_a_clip(demo, tmp_path):
+    written = demo.export(tmp_path, "jsonl", where="action = 'walk'")
+    lines = lines_of(tmp_path / "frames.jsonl")
+    assert {one.path for one in written} == {tmp_path / "frames.jsonl"}
+    assert [line["clip_id"] for line in lines] == [one.clip_id for one in written]
+    assert {line["action"] for line in lines} == {"walk"}
+    line = next(line for line in lines if line["clip_id"] == WALK)
+    motion = demo.motion(WALK)
+    assert (line["fps"], line["subject"], line["label"]) == (motion.fps, "alex", "walk")
+    assert line["joints"] == list(motion.skeleton.names)
+    assert line["parents"] == list(motion.skeleton.parents)
+    np.testing.assert_allclose(line["positions"], motion.positions(), atol=1e-6)
+    np.testing.assert_allclose(line["rotations"], motion.rotations, atol=1e-6)
+    np.testing.assert_allclose(line["offsets"], motion.skeleton.offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize("format_", ["bvh", "parquet", "jsonl"])
+def test_a_split_is_a_folder_a_part(demo, tmp_path, format_):
+    shares = {"train": 0.6, "val": 0.2, "test": 0.2}
+    written = demo.export(tmp_path, format_, split=shares, group="subject")
+    clips = {line["clip_id"]: line for line in lines_of(tmp_path / "clips.jsonl")}
+    assert set(clips) == {one.clip_id for one in written} == set(demo.clips.to_arrow()["clip_id"].to_pylist())
+    parts_of_subject = defaultdict(set)
+    for one in written:
+        clip = clips[one.clip_id]
+        assert one.path == tmp_path / clip["file"]
+        assert one.path.is_file()
+        assert one.path.relative_to(tmp_path).parts[0] == clip["split"]
+        parts_of_subject[clip["subject"]].add(clip["split"])
+    assert all(len(parts) == 1 for parts in parts_of_subject.values())
+    assert Counter(clip["split"] for clip in clips.values()) == {"train": 51, "val": 14, "test": 15}
+    for part in shares:
+        mine = {clip_id for clip_id, clip in clips.items() if clip["split"] == part}
+        if format_ == "parquet":
+            rows = pq.read_table(tmp_path / part / "frames.parquet")
+            assert set(rows["clip_id"].to_pylist()) == mine
+            assert set(rows["split"].to_pylist()) == {part}
+        elif format_ == "jsonl":
+            assert {line["clip_id"] for line in lines_of(tmp_path / part / "frames.jsonl")} == mine
+    if format_ == "parquet":
+        table = pq.read_table(tmp_path / "clips.parquet")
+        assert dict(zip(table["clip_id"].to_pylist(), table["split"].to_pylist(), strict=True)) == {
+            clip_id: clip["split"] for clip_id, clip in clips.items()
+        }
+
+
+def test_a_split_leaves_what_is_there(demo, tmp_path):
+    (tmp_path / "README.md").write_text("mine")
+    for how in ({"split": HALVES}, {"card": True}):
+        with pytest.raises(CatalogError, match="README.md would be replaced"):
+            demo.export(tmp_path, "npz", **how)
+    assert [file.name for file in tmp_path.rglob("*")] == ["README.md"]
+
+
+def test_the_command_splits_and_says_what_came_of_it(motionary, demo_catalog, tmp_path):
+    code, out, err = motionary(
+        "export", demo_catalog, tmp_path / "out", "--format", "csv", "--where", "action in ('walk', 'run')",
+        "--split", "train=.75,test=.25", "--group", "subject", "--seed", 3,
+    )  # fmt: skip
+    assert code == 0
+    card = json.loads((tmp_path / "out" / "card.json").read_text())
+    counts = {part["part"]: part["clips"] for part in card["split"]["parts"]}
+    assert counts == {"train": 16, "test": 4}
+    assert "train 16 (80.0%, asked 0.75), test 4 (20.0%, asked 0.25)" in out
+    assert "part test has 20% of the clips instead of 25%: whole groups allow no nearer" in err
+    assert card["split"]["seed"] == 3
+    assert len(list((tmp_path / "out" / "train").rglob("*.csv"))) == 16
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--split", "train=.8"), "two parts"),
+        (("--split", "train=.8,test=.3"), "add up"),
+        (("--split", "train:.8,test:.2"), "NAME=SHARE"),
+        (("--group", "subject"), "for a --split"),
+    ],
+)
+def test_a_split_that_is_none_is_wrong_usage(motionary, demo_catalog, tmp_path, options, message):
+    code, _, err = motionary("export", demo_catalog, tmp_path / "out", *options)
+    assert code == 2
+    assert message in " ".join(err.replace("│", " ").split())
+    assert not (tmp_path / "out").exists()
+
+
 def test_parquet_is_the_table_and_what_its_rows_are_of(demo, tmp_path):
     demo.export(tmp_path, "parquet", cluster="walk", aligned=True)
     rows, clips = (pq.read_table(tmp_path / f"{name}.parquet") for name in ("aligned", "clips"))
@@ -191,7 +327,15 @@ def test_a_cluster_is_chosen_by_number_or_by_name(demo, tmp_path):
         ({"clips": [WALK, WALK.replace("01", "09")]}, "no clip 'walk/walk_tired_alex_09.bvh'.*did you mean"),
         ({"clips": []}, "none of them is chosen"),
         ({"clips": [WALK], "cluster": 1}, "by one of them"),
-        ({"format": "fbx"}, "'fbx'; a motion is exported as bvh, npz or parquet"),
+        ({"where": "seconds > 1000"}, "none of them is chosen"),
+        ({"clips": [WALK], "where": "action = 'run'"}, "none of them is chosen"),
+        ({"where": "sceonds > 1"}, "sceonds"),
+        ({"group": "subject"}, "grouped by subject for a split, and none is asked for"),
+        ({"split": HALVES, "group": "subjct"}, "no column 'subjct'.*did you mean subject"),
+        ({"split": HALVES, "group": "licence"}, "no clip has a value in column 'licence'"),
+        ({"split": HALVES, "clips": [WALK]}, "make 1 group .*too few for the 2 parts train, test"),
+        ({"split": HALVES | {"val": 0.5}}, "add up to 1.5 instead of 1"),
+        ({"format": "fbx"}, "'fbx'; a motion is exported as bvh, npz, csv, parquet or jsonl"),
     ],
 )
 def test_what_cannot_be_chosen(demo, tmp_path, options, message):
@@ -241,6 +385,26 @@ def test_a_name_does_not_depend_on_what_else_is_chosen(demo, tmp_path):
     assert plan_export(demo, tmp_path).paths[WALK] == alone[WALK]
 
 
+def test_a_line_that_cannot_be_written_does_not_stop_the_others(demo, tmp_path, monkeypatch):
+    usual = export.motion_line
+
+    def choosy(motion, about):
+        if motion.name == WALK:
+            raise ValueError("a number that JSON does not know")
+        return usual(motion, about)
+
+    monkeypatch.setattr(export, "motion_line", choosy)
+    written = demo.export(tmp_path, "jsonl", split=HALVES)
+    assert [(one.clip_id, one.reason) for one in written if one.reason] == [
+        (WALK, "a number that JSON does not know")
+    ]
+    lines = [line for part in HALVES for line in lines_of(tmp_path / part / "frames.jsonl")]
+    assert len(lines) == len(demo.clips) - 1
+    card = json.loads((tmp_path / "card.json").read_text())
+    assert card["not_written"] == {WALK: "a number that JSON does not know"}
+    assert card["clips"] == len(lines_of(tmp_path / "clips.jsonl")) == len(lines)
+
+
 def test_a_clip_that_cannot_be_written_does_not_stop_the_others(demo, tmp_path, monkeypatch):
     usual = export.write_bvh
 
@@ -260,7 +424,7 @@ def test_a_clip_that_cannot_be_written_does_not_stop_the_others(demo, tmp_path, 
         assert one.path.is_file() == (one.reason is None)
 
 
-@pytest.mark.parametrize("format_", ["bvh", "npz", "parquet"])
+@pytest.mark.parametrize("format_", ["bvh", "npz", "csv", "parquet", "jsonl"])
 def test_a_full_disk_stops_it_and_leaves_what_was_there(demo, tmp_path, monkeypatch, format_):
     demo.export(tmp_path, format_, clips=[WALK])
     there = [file for file in tmp_path.rglob("*") if file.is_file()]
@@ -285,7 +449,7 @@ def test_a_folder_that_cannot_be_made(demo, tmp_path):
             demo.export(folder)
 
 
-@pytest.mark.parametrize("format_", ["npz", "parquet"])
+@pytest.mark.parametrize("format_", ["npz", "parquet", "jsonl"])
 def test_one_part_of_the_catalog_at_a_time(demo, tmp_path, monkeypatch, format_):
     parts = demo.files("frames")
     assert len(parts) > 1
