@@ -6,7 +6,6 @@ import json
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import pyarrow as pa
@@ -24,9 +23,14 @@ from motionary.pipeline.motion import Motion
 
 if TYPE_CHECKING:
     from motionary.catalog.description import Description
+    from motionary.catalog.explanation import Explanation
     from motionary.catalog.export import ExportedClip
     from motionary.catalog.export_plan import ExportFormat
+    from motionary.catalog.given_files import Asked
+    from motionary.catalog.neighbours import Rank, Similar
+    from motionary.catalog.occurrences import Occurrences
     from motionary.catalog.sql import Parameters
+    from motionary.pipeline.config import Metric
 
 T = TypeVar("T")
 
@@ -181,8 +185,8 @@ class Catalog:
     def sql(self, query: str, parameters: Parameters | None = None) -> pa.Table:
         """Ask a question in DuckDB's SQL; every table of the catalog is a view of its name.
 
-        View `takes` has the columns of `clips`, but for the skeletons, and of `clusters`, a row a clip. A query
-        can read the catalog and nothing else: no other file, no address, no setting.
+        View `takes` has the columns of `clips`, but for the skeletons, and of `clusters`, a row a clip. A
+        query can read the catalog and nothing else: no other file, no address, no setting.
 
         Parameters
         ----------
@@ -250,6 +254,49 @@ class Catalog:
             The catalog has no such clip.
         """
         return self._motion(clip_id, aligned=True)
+
+    def similar(
+        self,
+        clip_or_file: str | os.PathLike[str],
+        k: int = 10,
+        *,
+        metric: Metric | None = None,
+        joints: str | Sequence[str] | None = None,
+        rank: Rank = "distance",
+    ) -> Similar:
+        """Find the clips most like one of the catalog, or like a file; see `motionary.catalog.neighbours`."""
+        from motionary.catalog.neighbours import similar
+
+        return similar(self, clip_or_file, k, metric=metric, joints=joints, rank=rank)
+
+    def occurrences(
+        self,
+        clip_or_file: str | os.PathLike[str],
+        k: int = 10,
+        *,
+        takes: str | Sequence[str] | None = None,
+        joints: str | Sequence[str] | None = None,
+    ) -> Occurrences:
+        """Find where a short motion occurs in longer takes; see `motionary.catalog.occurrences`."""
+        from motionary.catalog.occurrences import occurrences
+
+        return occurrences(self, clip_or_file, k, takes=takes, joints=joints)
+
+    def assign(
+        self, files: Asked | Sequence[Asked], *, advance: Callable[[], None] = lambda: None
+    ) -> pa.Table:
+        """Tell which clusters files, or motions, belong to; see `motionary.catalog.assign`."""
+        from motionary.catalog.assign import assign
+
+        return assign(self, files, advance=advance)
+
+    def explain(
+        self, a: str | os.PathLike[str], b: str | os.PathLike[str], metric: Metric | None = None
+    ) -> Explanation:
+        """Tell why two motions are as far apart as they are; see `motionary.catalog.explain`."""
+        from motionary.catalog.explain import explain
+
+        return explain(self, a, b, metric)
 
     def export(
         self,
@@ -333,12 +380,22 @@ class Catalog:
         )
         return list(write_export(plan))
 
+    def require(self, *clip_ids: str) -> None:
+        """Check that there are such clips.
+
+        Raises
+        ------
+        CatalogError
+            There is none of a name; the message tells the nearest names.
+        """
+        known = self.keep("clips", lambda: dict.fromkeys(self.clips.to_arrow()["clip_id"].to_pylist()))
+        for clip_id in clip_ids:
+            if clip_id not in known:
+                raise CatalogError(f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, [*known])}")
+
     def _motion(self, clip_id: str, aligned: bool) -> Motion:
-        known = self.clips.to_arrow()["clip_id"].to_pylist()
-        if clip_id not in known:
-            raise CatalogError(f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, known)}")
-        with closing(stream_motions(self, [clip_id], aligned)) as motions:
-            return next(motions)
+        self.require(clip_id)
+        return next(stream_motions(self, [clip_id], aligned))
 
     def _read_config(self) -> PipelineConfig:
         try:

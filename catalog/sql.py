@@ -10,7 +10,6 @@ import re
 import threading
 from collections.abc import Mapping, Sequence
 
-import duckdb
 import pyarrow as pa
 from fsspec.implementations.local import LocalFileSystem
 
@@ -38,6 +37,8 @@ class SqlSession:
     """
 
     def __init__(self, store: Store, snapshot: Snapshot) -> None:
+        import duckdb  # a part of a second, which only those who ask in SQL should wait for
+
         self._store, self._snapshot = store, snapshot
         self._made: set[str] = set()
         self._lock = threading.Lock()
@@ -58,6 +59,8 @@ class SqlSession:
         CatalogError
             The query is not valid, with DuckDB's message; or a file of the catalog is damaged.
         """
+        import duckdb
+
         try:
             with self._connection.cursor() as cursor:
                 statements = cursor.extract_statements(query)

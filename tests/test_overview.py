@@ -89,6 +89,8 @@ def make_catalog(folder, demo, clip_ids, labels=NO_LABELS, config=None, quaranti
     made |= name_them(made["clips"], made["represented"], made["centres"], none["labels"], config)
     made |= {"frames": frames, "features": features, "pairs": pairs, "resampled": own("resampled", "clip_id")}
     made["quarantine"] = pa.Table.from_pylist(list(quarantine), schema=SCHEMAS["quarantine"])
+    inputs = own("inputs", "clip_id").drop_columns("batch")
+    made["inputs"] = inputs.append_column("batch", pa.array([0] * len(inputs), pa.int32()))
     run = demo.runs.to_arrow().to_pylist()[-1]
     run |= {"clips": len(ingested), "clusters": len(made["references"]), "quarantined": len(quarantine)}
     made["runs"] = pa.Table.from_pylist([run], schema=SCHEMAS["runs"])

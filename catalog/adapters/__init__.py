@@ -1,0 +1,1 @@
+"""Chosen clips as what other libraries work on; each module wants its library installed."""
