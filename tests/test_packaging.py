@@ -1,7 +1,10 @@
 """The house: what is installed, and that what the documents name exists."""
 
 import io
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from importlib import import_module
 from pathlib import Path
@@ -106,3 +109,17 @@ def test_the_readme_shows_what_the_demo_prints(demo_catalog):
     shown = [" ".join(line.split()) for line in block.splitlines() if line.strip() not in ("", "...")]
     assert len(shown) > 5
     assert set(shown) <= lines
+
+
+def test_the_readmes_questions_get_the_readmes_answers(demo_library, demo_catalog):
+    """The block is run in a shell, line by line, where `make demo` leaves library and catalog."""
+    blocks = re.findall(r"```console\n\$ cd motionary-demo\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    asked = re.split(r"^\$ ", blocks[0], flags=re.M)[1:]
+    assert len(asked) == 3
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    for one in asked:
+        command, _, shown = one.partition("\n")
+        shell, folder = ["bash", "-c", command], demo_library.parent
+        told = subprocess.run(shell, check=False, cwd=folder, env=environment, capture_output=True, text=True)
+        lines = [line.rstrip() for line in told.stdout.splitlines()]
+        assert lines == shown.splitlines(), told.stderr

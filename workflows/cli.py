@@ -12,21 +12,26 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from motionary.workflows.commands.check import doctor, verify
-from motionary.workflows.commands.label import label
-from motionary.workflows.commands.look import query, status
-from motionary.workflows.commands.nightly import nightly
-from motionary.workflows.commands.options import FAILED, fail
-from motionary.workflows.commands.reproduce import reproduce
-from motionary.workflows.commands.run import demo, graph, run
-from motionary.workflows.commands.snapshots import diff, runs, vacuum
-from motionary.workflows.commands.take_out import export, transfer
+from motionary.workflows.commands import (
+    assign,
+    check,
+    explain,
+    fetch,
+    label,
+    look,
+    nightly,
+    reproduce,
+    run,
+    similar,
+    snapshots,
+    take_out,
+)
+from motionary.workflows.commands.options import FAILED, examples, fail
 from motionary.workflows.errors import UserError
 
 app = typer.Typer(
     name="motionary",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips, 4 verification failed.",
@@ -50,12 +55,11 @@ def motionary(
     """Cluster, name and align a library of motion capture: a dictionary of motion."""
 
 
-COMMANDS = (
-    run, nightly, demo, status, query, runs, diff, graph, export, transfer, verify, vacuum, doctor, reproduce
-)  # fmt: skip
-for command in COMMANDS:
-    app.command()(command)
-app.add_typer(label, name="label")
+# A module's EXAMPLES name its commands; the order is that of `motionary --help`.
+for module in (run, nightly, look, similar, assign, explain, take_out, snapshots, check, fetch, reproduce):
+    for name, lines in module.EXAMPLES.items():
+        app.command(name, epilog=examples(*lines))(getattr(module, name))
+app.add_typer(label.label, name="label")
 
 
 def main() -> NoReturn:
@@ -71,9 +75,13 @@ def main() -> NoReturn:
         fail(_disk_fault(error))
     except Exception as error:
         from motionary.catalog import CatalogError
+        from motionary.pipeline.canonical import SkeletonError
+        from motionary.pipeline.compilation import KernelCacheError
+        from motionary.pipeline.readers import ReadError
 
+        told = isinstance(error, CatalogError | ReadError | SkeletonError | KernelCacheError)
         # What keeps s3fs from reaching a server, or from signing in there, is botocore's own.
-        if not isinstance(error, CatalogError) and not type(error).__module__.startswith("botocore."):
+        if not told and not type(error).__module__.startswith("botocore."):
             raise
         fail(str(error))
     sys.exit(0)

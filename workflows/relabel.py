@@ -21,7 +21,6 @@ from motionary.catalog.snapshot import OVERVIEW, next_snapshot_id, publish
 from motionary.catalog.store import PartFacts, Store
 from motionary.catalog.views.overview import overview_page
 from motionary.catalog.writer_lock import Writer, the_only_writer
-from motionary.pipeline.config import ClusterConfig, PipelineConfig
 from motionary.pipeline.graph import naming_task
 from motionary.pipeline.task import run_task
 from motionary.workflows.computation import StoredParts
@@ -130,14 +129,12 @@ def _publish(current: Catalog, labels: pa.Table) -> None:
 def _named(current: Catalog, labels: pa.Table) -> dict[str, dict[str, PartFacts]]:
     """Store what the naming stage makes of these labels; return its files and their facts by table."""
     store = current.store
-    clusters = current.settings["clusters"]
-    settings = ClusterConfig(label_column=clusters["label_column"], reach=clusters["reach"])
     overrides = labels.filter(pc.is_in(labels["clip_id"], current.inputs.to_arrow()["clip_id"]))
     clustered, represented = (
         posixpath.basename(current.files(table)[0]).removesuffix(".parquet")
         for table in ("clips", "represented")
     )
-    task = naming_task(clustered, represented, overrides, PipelineConfig(clusters=settings))
+    task = naming_task(clustered, represented, overrides, current.config)
     files = {table: store.part_name(table, task.key) for table in task.makes}
     stored = StoredParts(store, current.snapshot).facts(task.key, task.makes) or run_task(task, store).stored
     return {table: {file: stored[table]} for table, file in files.items()}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 
@@ -27,6 +29,23 @@ def print_summary(catalog: Catalog, console: Console) -> None:
         parts += ["", clusters_shown(catalog), "", cut_table(catalog)]
     parts += ["", _times(run), "", _places(catalog)]
     console.print(Group(*parts))
+
+
+def summary_record(catalog: Catalog) -> dict[str, Any]:
+    """Say as plain values what `print_summary` prints."""
+    run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+    return {
+        "catalog": catalog.store.url,
+        "snapshot": catalog.snapshot.snapshot_id,
+        "run_id": run["run_id"],
+        "clips": run["clips"],
+        "clusters": cluster_table(catalog).to_pylist(),
+        "cuts": catalog.cuts.to_arrow().to_pylist(),
+        "quarantine": catalog.quarantine.to_arrow().to_pylist(),
+        "seconds": (run["finished_at"] - run["started_at"]).total_seconds(),
+        "stage_seconds": dict(run["stage_seconds"]),
+        "overview": catalog.store.full_path(OVERVIEW),
+    }
 
 
 def clusters_shown(catalog: Catalog) -> RenderableType:
@@ -65,6 +84,20 @@ def quarantine_table(catalog: Catalog) -> RenderableType:
     return text_table(["file", "line", "reason", "mend"], rows, "Quarantined")
 
 
+def clip_record(catalog: Catalog, clip_id: str) -> dict[str, Any]:
+    """Say as plain values what is known of one clip.
+
+    Raises
+    ------
+    CatalogError
+        The catalog has no such clip.
+    """
+    catalog.require(clip_id)
+    query = """select takes.*, reference_id, correlation_before, correlation
+               from takes join alignments using (clip_id) where clip_id = ?"""
+    return catalog.sql(query, [clip_id]).to_pylist()[0]
+
+
 def print_clip(catalog: Catalog, clip_id: str, console: Console) -> None:
     """Print what is known of one clip.
 
@@ -73,20 +106,14 @@ def print_clip(catalog: Catalog, clip_id: str, console: Console) -> None:
     CatalogError
         The catalog has no such clip.
     """
-    motion = catalog.motion(clip_id)
-    row = catalog.sql(
-        """select c.label, c.label_source, c.confidence, c.cluster_id, c.is_reference,
-                  c.distance_to_reference, a.reference_id, a.correlation_before, a.correlation
-           from clusters c join alignments a using (clip_id) where c.clip_id = ?""",
-        [clip_id],
-    ).to_pylist()[0]
+    row = clip_record(catalog, clip_id)
     facts = {
-        "frames": f"{motion.frames} at {motion.fps:g} a second, {motion.seconds:.2f} s",
+        "frames": f"{row['frames']} at {row['fps']:g} a second, {row['seconds']:.2f} s",
         "label": f"{row['label'] or 'none'} ({row['label_source']}, confidence {row['confidence']:.2f})",
         "cluster": str(row["cluster_id"]) + (", its reference" if row["is_reference"] else ""),
         "reference": f"{row['reference_id']}, at distance {row['distance_to_reference']:.4f}",
         "correlation": f"{row['correlation_before']:.3f} length-matched, {row['correlation']:.3f} aligned",
-        "notes": "; ".join(motion.notes) or "none",
+        "notes": "; ".join(row["notes"]) or "none",
     }
     console.print(text_table([clip_id, ""], list(facts.items())))
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import pyarrow as pa
@@ -43,8 +44,7 @@ def write_table(table: pa.Table, format_: Format) -> None:
     """
     sink = sys.stdout.buffer
     if format_ == "json":
-        text = json.dumps(table.to_pylist(), default=str, ensure_ascii=False, indent=1)
-        sink.write(text.encode() + b"\n")
+        write_json(table.to_pylist())
     elif format_ == "csv":
         pa_csv.write_csv(_csv_cells(table), sink)
     elif format_ == "parquet":
@@ -52,6 +52,12 @@ def write_table(table: pa.Table, format_: Format) -> None:
     else:
         columns = [[_shown(value) for value in column.to_pylist()] for column in table.columns]
         output_console().print(text_table(table.column_names, list(zip(*columns, strict=True))))
+
+
+def write_json(value: object) -> None:
+    """Write an answer that is no table to stdout; numbers that are none become null, as JSON has no other."""
+    text = json.dumps(_finite(value), default=str, ensure_ascii=False, indent=1, allow_nan=False)
+    sys.stdout.buffer.write(text.encode() + b"\n")
 
 
 def text_table(
@@ -66,6 +72,14 @@ def text_table(
         made.add_row(*map(Text, row))  # not markup: a name may hold brackets
     # Above the table and not as its title, which would be folded to the table's width.
     return Group(Text(title), made) if title else made
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _csv_cells(table: pa.Table) -> pa.Table:

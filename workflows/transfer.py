@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -11,7 +12,6 @@ from rich.console import RenderableType
 
 from motionary.catalog import Catalog
 from motionary.catalog.export_plan import refuse_library
-from motionary.pipeline.canonical import Convention
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.style import fastest_joint, foot_sliding, transfer
 from motionary.pipeline.style.contact import USUAL_LEG
@@ -40,6 +40,16 @@ class StyleTransfer:
     reference_id: str
     sliding: dict[str, float]
     fastest: dict[str, float]
+
+    def record(self) -> dict[str, Any]:
+        """Say as plain values what is printed of it."""
+        return {
+            "frames": self.motion.frames,
+            "reference_id": self.reference_id,
+            "sliding": self.sliding,
+            "fastest": self.fastest,
+            "is_jerky": self.is_jerky,
+        }
 
     @property
     def is_jerky(self) -> bool:
@@ -89,7 +99,7 @@ def transfer_style(catalog: Catalog, style: str, onto: str) -> StyleTransfer:
     """
     styled, plain = catalog.aligned(style), catalog.aligned(onto)
     reference_id = _reference(catalog, style, onto)
-    conventions = _conventions(catalog)
+    conventions = catalog.config.features.conventions
     try:
         motion = transfer(styled, catalog.aligned(reference_id), plain, conventions)
     except ValueError as error:
@@ -120,9 +130,3 @@ def _reference(catalog: Catalog, style: str, onto: str) -> str:
         places = [f"{clip} is in cluster {number} ({names[number] or 'unnamed'})" for clip, number in numbers]
         raise UserError(f"{', '.join(places)}; style is transferred between clips of one cluster")
     return rows[style]["reference_id"]
-
-
-def _conventions(catalog: Catalog) -> tuple[Convention, ...]:
-    """Read back the joint-name conventions that the catalog was made with."""
-    settings = catalog.settings
-    return tuple(Convention(**one) for one in settings["features"]["conventions"])

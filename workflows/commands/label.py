@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from motionary.workflows.commands.options import CatalogUrl, OutputFormat, open_catalog, stderr_console
+from motionary.workflows.commands.options import (
+    AsJson,
+    CatalogUrl,
+    OutputFormat,
+    examples,
+    open_catalog,
+    stderr_console,
+)
 
 label = typer.Typer(
     no_args_is_help=True,
@@ -23,27 +30,34 @@ Clip = Annotated[
 ]
 
 
-@label.command("set")
+@label.command(
+    "set",
+    epilog=examples(
+        "motionary label set CATALOG walk/walk_tired_alex_01.bvh trudge",
+        "motionary label set CATALOG 'walk/*_tired_*' trudge  # all that a pattern means",
+    ),
+)
 def set_(
     catalog: CatalogUrl,
     clip: Clip,
     called: Annotated[str, typer.Argument(metavar="LABEL", help="What it is called.")],
+    as_json: AsJson = False,
 ) -> None:
     """Call CLIP of CATALOG by LABEL."""
     with open_catalog(catalog) as opened:
         known = opened.inputs.to_arrow()["clip_id"].to_pylist()
-    _relabel(catalog, dict.fromkeys(_meant(clip, known, catalog), called.strip()))
+    _relabel(catalog, dict.fromkeys(_meant(clip, known, catalog), called.strip()), as_json)
 
 
-@label.command()
-def remove(catalog: CatalogUrl, clip: Clip) -> None:
+@label.command(epilog=examples("motionary label remove CATALOG 'walk/*_tired_*'"))
+def remove(catalog: CatalogUrl, clip: Clip, as_json: AsJson = False) -> None:
     """Forget what was set for CLIP: it has its supplied label again, or its cluster's."""
     with open_catalog(catalog) as opened:
         known = opened.labels.to_arrow()["clip_id"].to_pylist()
-    _relabel(catalog, dict.fromkeys(_meant(clip, known, f"the list of labels of {catalog}")))
+    _relabel(catalog, dict.fromkeys(_meant(clip, known, f"the list of labels of {catalog}")), as_json)
 
 
-@label.command("import")
+@label.command("import", epilog=examples("motionary label import CATALOG review.csv"))
 def import_(
     catalog: CatalogUrl,
     csv: Annotated[
@@ -52,16 +66,17 @@ def import_(
             metavar="CSV", help="Columns clip_id or path, and label; an empty one is passed over."
         ),
     ],
+    as_json: AsJson = False,
 ) -> None:
     """Set the labels of a CSV, such as the list of `label review` filled in: all of them, or none."""
     from motionary.workflows.label_import import labels_to_import
 
     with open_catalog(catalog) as opened:
         changes = labels_to_import(csv, opened)
-    _relabel(catalog, changes)
+    _relabel(catalog, changes, as_json)
 
 
-@label.command("list")
+@label.command("list", epilog=examples("motionary label list CATALOG --format csv > labels.csv"))
 def list_(catalog: CatalogUrl, format_: OutputFormat = "table") -> None:
     """List what people have set, also for clips that are gone: those labels wait for them."""
     from motionary.workflows.tables import write_table
@@ -75,7 +90,12 @@ def list_(catalog: CatalogUrl, format_: OutputFormat = "table") -> None:
     write_table(listed, format_)
 
 
-@label.command()
+@label.command(
+    epilog=examples(
+        "motionary label review CATALOG -n 20",
+        "motionary label review CATALOG --format csv > review.csv  # fill in column label, then import it",
+    )
+)
 def review(
     catalog: CatalogUrl,
     format_: OutputFormat = "table",
@@ -108,20 +128,22 @@ def _meant(clip: str, known: Sequence[str], where: str) -> list[str]:
     return matching
 
 
-def _relabel(url: str, changes: Mapping[str, str | None]) -> None:
+def _relabel(url: str, changes: Mapping[str, str | None], as_json: bool) -> None:
     from motionary.workflows.relabel import relabel
     from motionary.workflows.summary import counted
+    from motionary.workflows.tables import write_json
 
-    if not changes:
-        _say("there is no label to set; nothing was changed")
-        return
     take_over = lambda dead: _say(f"taking over from a run that died: {dead}")  # noqa: E731
     with open_catalog(url) as before, relabel(url, changes, _user(), take_over) as after:
-        same = before.snapshot.snapshot_id == after.snapshot.snapshot_id
-    if same:
-        _say("every label was so already; nothing was changed")
+        snapshot_id = after.snapshot.snapshot_id
+        changed = before.snapshot.snapshot_id != snapshot_id
+    if as_json:
+        write_json({"clips": [*changes] if changed else [], "snapshot": snapshot_id})
+    elif changed:
+        _say(f"labels of {counted(len(changes), 'clip')} changed in snapshot {snapshot_id}")
     else:
-        _say(f"labels of {counted(len(changes), 'clip')} changed in snapshot {after.snapshot.snapshot_id}")
+        why = "every label was so already" if changes else "there is no label to set"
+        _say(f"{why}; nothing was changed")
 
 
 def _user() -> str:

@@ -14,6 +14,14 @@ from motionary.workflows.commands.options import fail
 if TYPE_CHECKING:
     from motionary.workflows.preparation import Job
 
+EXAMPLES = {
+    "nightly": (
+        "motionary nightly --example > nightly.toml  # every setting, with a comment",
+        "motionary nightly nightly.toml --dry-run  # counts and an estimate as JSON",
+        "motionary nightly nightly.toml --json  # the report on stdout, the log on stderr",
+    )
+}
+
 _USAGE = 2
 
 
@@ -26,6 +34,7 @@ def nightly(
         bool, typer.Option("--dry-run", help="Say what would be done, and write nothing.")
     ] = False,
     example: Annotated[bool, typer.Option("--example", help="Print a commented CONFIG and exit.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Answer with the report.")] = False,
 ) -> None:
     """Run the main job as a timer does: with limits, retention, log and report.
 
@@ -55,7 +64,10 @@ def nightly(
         report = run_nightly(settings, log)
     if settings.log is not None and report.error:  # cron sends stderr by mail; without a file it is the log
         fail(report.error)
-    print(f"{report.run_id} {report.status}, snapshot {report.snapshot_after or report.snapshot_before}")
+    if as_json:
+        print(report.to_json())
+    else:
+        print(f"{report.run_id} {report.status}, snapshot {report.snapshot_after or report.snapshot_before}")
     raise typer.Exit(report.exit_code)
 
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 FAILED, QUARANTINED, UNVERIFIED = 1, 3, 4
 """Exit codes beside 0, done, and 2, usage: failed; done with quarantined clips; verification failed."""
 
+COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
+
 CatalogUrl = Annotated[
     str, typer.Argument(metavar="CATALOG", help="Folder of the catalog, or its fsspec URL.")
 ]
@@ -28,7 +30,18 @@ OutputFormat = Annotated[
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine.", show_default="one a core")
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Answer as JSON.")]
 Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
+
+
+def examples(*lines: str) -> str:
+    """Write the end of a command's help: each line a command, with what it gives after a #.
+
+    What it gives stands above it, for a terminal folds lines that are longer than 80 characters.
+    """
+    split = (line.partition("  # ") for line in lines)
+    shown = [[f"# {remark}"] * bool(remark) + [f"$ {command}"] for command, _, remark in split]
+    return "\n".join(["Examples:", "", *(line for pair in shown for line in pair)])
 
 
 def open_catalog(url: str, snapshot: str | None = None) -> Catalog:
@@ -43,6 +56,15 @@ def stderr_console() -> Console:
     from rich.console import Console
 
     return Console(stderr=True)
+
+
+def compile_first() -> None:
+    """Compile the kernels before they are needed, one process alone: see `motionary.pipeline.compilation`."""
+    from functools import partial
+
+    from motionary.pipeline.compilation import compile_kernels
+
+    compile_kernels(partial(stderr_console().print, COMPILING, highlight=False))
 
 
 def fail(message: str) -> NoReturn:

@@ -8,11 +8,20 @@ import typer
 
 from motionary.workflows.commands.options import OutputFormat, open_catalog, stderr_console
 
+EXAMPLES = {
+    "reproduce": (
+        "motionary reproduce dtw-curve CATALOG",
+        "motionary reproduce cotw CATALOG --draws 3 --format json",
+        "motionary reproduce assign CATALOG",
+        "motionary reproduce style",
+    )
+}
+
 
 def reproduce(
     name: Annotated[
-        Literal["dtw-curve", "dtw-curve-better", "cotw", "style"],
-        typer.Argument(metavar="NAME", help="dtw-curve, dtw-curve-better, cotw or style."),
+        Literal["dtw-curve", "dtw-curve-better", "cotw", "style", "assign", "mutual"],
+        typer.Argument(metavar="NAME", help="dtw-curve, dtw-curve-better, cotw, style, assign or mutual."),
     ],
     catalog: Annotated[
         str | None, typer.Argument(metavar="CATALOG", help="Labelled catalog; style needs none.")
@@ -22,8 +31,8 @@ def reproduce(
         typer.Option(
             "--draws",
             min=1,
-            help="Sets of clips drawn by each rule; for cotw, pairs of each action.",
-            show_default="100, cotw 10",
+            help="Sets of clips drawn by each rule; for cotw, pairs of each action; for assign, partings.",
+            show_default="100, cotw 10, assign 5",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
@@ -36,7 +45,8 @@ def reproduce(
 
     dtw-curve: which distance, linkage and features find the classes. dtw-curve-better: changes to the
     default. cotw: which alignment brings clips of one action together. style: how well styles are told apart
-    by what alignment leaves over, on made-up takes.
+    by what alignment leaves over, on made-up takes. assign: whether takes that are held out get their names.
+    mutual: whether ranking by mutual proximity finds a clip's action better.
     """
     from functools import partial
 

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from motionary.workflows.commands.options import (
+    COMPILING,
     QUARANTINED,
+    AsJson,
     CatalogUrl,
     Scheduler,
     Workers,
@@ -24,7 +26,16 @@ if TYPE_CHECKING:
     from motionary.workflows.main_job import RunResult
     from motionary.workflows.preparation import Job
 
-_COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
+EXAMPLES = {
+    "run": (
+        "motionary run LIBRARY CATALOG --labels labels.csv",
+        "motionary run LIBRARY CATALOG --label-pattern '(?P<action>[a-z]+)_'",
+        "motionary run LIBRARY CATALOG --dry-run  # what there is to do",
+        "motionary run LIBRARY CATALOG --json | jq .clusters",
+    ),
+    "demo": ("motionary demo", "motionary demo FOLDER --seed 1"),
+    "graph": ("motionary graph graph.svg", "motionary graph graph.txt --library LIBRARY"),
+}
 
 
 def run(
@@ -85,10 +96,12 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what there is to do, and write nothing.")
     ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
     from motionary.workflows.preparation import Job, prepare
     from motionary.workflows.settings import PAPER, load_settings
+    from motionary.workflows.tables import write_json
 
     if clusters is not None and threshold is not None:
         raise typer.BadParameter("give --clusters or --threshold, not both")
@@ -109,10 +122,12 @@ def run(
     job = Job(
         libraries, catalog, load_settings(config, options), labels, _count(workers), scheduler, label_pattern
     )
-    if dry_run:
-        print(prepare(job).plan)
+    if not dry_run:
+        _run(job, as_json)
+    elif as_json:
+        write_json(vars(prepare(job).plan))
     else:
-        _run(job)
+        print(prepare(job).plan)
 
 
 def demo(
@@ -121,6 +136,7 @@ def demo(
     ),
     seed: Annotated[int, typer.Option("--seed", help="Of the embedded library.")] = 0,
     workers: Workers = None,
+    as_json: AsJson = False,
 ) -> None:
     """Run the main job on the embedded library of made-up motions and show the result."""
     from motionary.pipeline.synthetic import write_library
@@ -133,7 +149,10 @@ def demo(
     write_library(library, seed=seed)
     log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
     labels = library / "labels.csv"
-    _run(Job([str(library)], str(catalog), load_settings(None, {}), labels, workers=_count(workers)))
+    job = Job([str(library)], str(catalog), load_settings(None, {}), labels, workers=_count(workers))
+    _run(job, as_json)
+    if as_json:
+        return
     print(f"\nNext:\n  open {catalog / 'overview.html'} in a browser")
     print(f'  {_program()} query {catalog} "select label, count(*) as clips from clusters group by label"')
     print(f"  {_program()} status {catalog}")
@@ -145,35 +164,43 @@ def graph(
         Path | None,
         typer.Option("--library", help="Show the graph of this library.", show_default="three clips"),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Draw the Dask graph of the main job."""
     from motionary.workflows.graph_picture import draw_graph
+    from motionary.workflows.tables import write_json
 
     draw_graph(out, library)
-    print(f"wrote {out}")
+    if as_json:
+        write_json({"file": str(out)})
+    else:
+        print(f"wrote {out}")
 
 
-def _run(job: Job) -> None:
+def _run(job: Job, as_json: bool) -> None:
     from functools import partial
 
     from motionary.workflows.main_job import run
     from motionary.workflows.progress import progress
-    from motionary.workflows.summary import print_summary
-    from motionary.workflows.tables import output_console
+    from motionary.workflows.summary import print_summary, summary_record
+    from motionary.workflows.tables import output_console, write_json
 
     log = stderr_console()
     try:
         result = run(
             job,
             partial(progress, console=log),
-            partial(log.print, _COMPILING, highlight=False),
+            partial(log.print, COMPILING, highlight=False),
             take_over=lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
             planned=lambda plan: log.print(str(plan), highlight=False, soft_wrap=True),
         )
     except KeyboardInterrupt:
         fail("interrupted; the published catalog is as it was, and the same command resumes")
     _explain(result, job, log)
-    print_summary(result.catalog, output_console())
+    if as_json:
+        write_json(summary_record(result.catalog))
+    else:
+        print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
         raise typer.Exit(QUARANTINED)
 

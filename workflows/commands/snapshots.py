@@ -6,7 +6,25 @@ from typing import Annotated
 
 import typer
 
-from motionary.workflows.commands.options import CatalogUrl, OutputFormat, open_catalog, stderr_console
+from motionary.workflows.commands.options import (
+    AsJson,
+    CatalogUrl,
+    OutputFormat,
+    open_catalog,
+    stderr_console,
+)
+
+EXAMPLES = {
+    "runs": ("motionary runs CATALOG",),
+    "diff": (
+        "motionary diff CATALOG 1 2  # by snapshots' numbers, or by runs' ids",
+        "motionary diff CATALOG 1 2 --format csv > changes.csv",
+    ),
+    "vacuum": (
+        "motionary vacuum CATALOG --keep 7 --dry-run",
+        "motionary vacuum CATALOG --days 30",
+    ),
+}
 
 _RUN_HELP = "A run's id, or a snapshot's number."
 
@@ -52,6 +70,7 @@ def vacuum(
         typer.Option("--grace-hours", min=0, help="Keep what was published until less than this ago."),
     ] = 1.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Remove old snapshots of CATALOG, and the files that only they use.
 
@@ -68,6 +87,11 @@ def vacuum(
         store, lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False)
     ):
         done = remove(store, keep, days, grace_hours, dry_run)
+    if as_json:
+        from motionary.workflows.tables import write_json
+
+        write_json({"dry_run": dry_run, **vars(done)})
+        return
     which = f" ({', '.join(done.snapshots)})" if done.snapshots else ""
     print(
         f"{'would remove' if dry_run else 'removed'} {_count(len(done.snapshots), 'snapshot')}{which} "

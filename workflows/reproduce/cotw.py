@@ -82,10 +82,12 @@ def study_cotw(catalog: Catalog, label_column: str, draws: int, seed: int, show:
         angles, skeletons = {}, {}
         for clip_id in paired:
             motion = catalog.motion(clip_id)
-            angles[clip_id], skeletons[clip_id] = joint_angles(motion, rate), motion.skeleton.names
+            if motion.places is None:  # markers have no angles
+                angles[clip_id], skeletons[clip_id] = joint_angles(motion, rate), motion.skeleton.names
             advance("read")
         _load_kernels(actions, positions)
-        rows = _measure_pairs(POSITIONS, actions, positions, {}, partial(advance, "align"))
+        alike = dict.fromkeys(positions, ())
+        rows = _measure_pairs(POSITIONS, actions, positions, alike, partial(advance, "align"))
         rows += _measure_pairs(ANGLES, actions, angles, skeletons, partial(advance, "align"))
         for take in takes:
             rows += measure_known(take)
@@ -114,19 +116,21 @@ def _measure_pairs(
     skeletons: Mapping[str, tuple[str, ...]],
     advance: Callable[[], None],
 ) -> list[Measurement]:
-    """Measure all pairs but those of two skeletons, where skeletons are given."""
+    """Measure all pairs of clips whose skeletons are given and are the same."""
     rows: list[Measurement] = []
     for place, people in enumerate(actions[0].pairs):
         is_first = dofs == POSITIONS and place == 0
         methods = WITH_ANY_DISTORTION if is_first else METHODS
         for action in actions:
             for ids in action.pairs[people]:
+                advance()
+                names = [skeletons.get(one) for one in ids]
+                if names[0] is None or names[0] != names[1]:
+                    continue
                 moving, reference = (clips[one] for one in ids)
-                if skeletons.get(ids[0]) == skeletons.get(ids[1]):
-                    rows += measure_pair(f"{dofs}, {people}", action.name, ids, moving, reference, methods)
+                rows += measure_pair(f"{dofs}, {people}", action.name, ids, moving, reference, methods)
                 if is_first:
                     rows += measure_fixed(action.name, ids, moving, reference)
-                advance()
     return rows
 
 
