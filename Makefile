@@ -11,13 +11,14 @@ PEERS := .venv-peers
 SHARED_OUT := -n auto --dist loadfile
 SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml')
 
-.PHONY: help demo test test-all bench bench-alignment torture lint clean
+.PHONY: help demo test test-all bench bench-alignment bench-ask torture lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
 	@echo "make test      run the tests, without those marked slow"
 	@echo "make test-all  run all tests"
-	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment"
+	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment,"
+	@echo "               then questions to catalogs of up to 10,000 clips"
 	@echo "make torture   damage files, kill runs, fill disks, read while runs publish; an hour or more"
 	@echo "make lint      check style, types and the direction of imports"
 	@echo "make clean     remove the environments and what the targets made"
@@ -37,11 +38,15 @@ test-all: $(VENV)/installed
 bench: $(VENV)/installed $(PEERS)/environment
 	@echo "== The distances beside dtaidistance, aeon and tslearn: some minutes, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks --peers $(PEERS)/bin/python --json motionary-bench/bench.json
-	@$(MAKE) --no-print-directory bench-alignment
+	@$(MAKE) --no-print-directory bench-alignment bench-ask
 
 bench-alignment: $(VENV)/installed
 	@echo "== The alignment beside a naive recursion, and on real clips: a minute or two, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks.alignment --json motionary-bench/alignment.json
+
+bench-ask: $(VENV)/installed
+	@echo "== Questions to catalogs of 300 to 10,000 embedded clips; making them takes half an hour, the first time"
+	$(BIN)/python -m tests.benchmarks.ask --json motionary-bench/ask.json
 
 torture: $(VENV)/installed
 	@echo "== Damaged files, killed runs, readers under writing, full disks: an hour or more"

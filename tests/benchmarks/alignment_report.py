@@ -48,8 +48,10 @@ def as_row(figure: Figure) -> dict:
     return asdict(figure) | {"met": figure.met}
 
 
-def print_figures(record: dict, console: Console) -> None:
-    """Print a record; a quick run gives no verdict but on what is binding."""
+def print_figures(
+    record: dict, console: Console, how: str = "one thread but where more are named; medians"
+) -> None:
+    """Print a record and how it was taken; a quick run gives no verdict but on what is binding."""
     machine = record["machine"]
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
     if record["quick"]:
@@ -57,7 +59,7 @@ def print_figures(record: dict, console: Console) -> None:
     console.print(
         f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}", highlight=False
     )
-    console.print(f"{packages}; one thread but where more are named; medians", highlight=False)
+    console.print(f"{packages}; {how}", highlight=False)
     table = Table()
     for column in ("figure", "measured", "required", ""):
         table.add_column(column, justify="right" if column == "measured" else "left")
