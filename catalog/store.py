@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -153,9 +153,9 @@ class Store:
         content = self.read_bytes(file)
         return _facts(content, pq.read_metadata(pa.BufferReader(content)).num_rows)
 
-    def load(self, key: str, table: str) -> pa.Table:
-        """Read one part."""
-        return self.read([self.part_name(table, key)])
+    def load(self, key: str, table: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read one part, or some columns of it with their text as dictionaries, which take less memory."""
+        return self._read_part(self.part_name(table, key), self.filesystem, columns)
 
     def read(self, files: Iterable[str]) -> pa.Table:
         """Read parts of one table, joined in the order given; a column one part lacks is null there.
@@ -172,9 +172,11 @@ class Store:
             [self._read_part(file, filesystem) for file in files], promote_options="default"
         )
 
-    def _read_part(self, file: str, filesystem: Any) -> pa.Table:
+    def _read_part(self, file: str, filesystem: Any, columns: Sequence[str] | None = None) -> pa.Table:
         try:
-            return pq.read_table(self.path(file), filesystem=filesystem)
+            return pq.read_table(
+                self.path(file), filesystem=filesystem, columns=columns, read_dictionary=columns
+            )
         except FileNotFoundError:
             raise
         except (pa.ArrowException, OSError) as error:

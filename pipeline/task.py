@@ -36,9 +36,12 @@ class TableStore(Protocol):
     def save(self, key: str, tables: Mapping[str, pa.Table]) -> Mapping[str, Any]:
         """Store a result's tables and say of each what the caller wants to know."""
 
-    def load(self, key: str, table: str) -> pa.Table:
-        """Return a stored table."""
+    def load(self, key: str, table: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return a stored table, or some of its columns with their text as dictionaries."""
 
+
+_READ = {"pairs": [name for name in TABLES["pairs"].names if name != "curve"]}
+"""What stages read of a table that would not fit into memory whole: of all pairs, one number a distance."""
 
 IsStored = Callable[[str, Iterable[str]], bool]
 """Given a key and tables, whether the store has them."""
@@ -116,4 +119,4 @@ def run_task(task: Task, store: TableStore, before: Sequence[TaskReport] = ()) -
 def _joined(store: TableStore, table: str, keys: Sequence[str]) -> pa.Table:
     if not keys:
         return TABLES[table].empty_table()
-    return pa.concat_tables([store.load(key, table) for key in keys])
+    return pa.concat_tables([store.load(key, table, _READ.get(table)) for key in keys])

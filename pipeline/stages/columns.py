@@ -97,9 +97,18 @@ def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> N
     if len(pairs) != size:
         raise ValueError(f"{count} clips have {size} pairs; the table has {len(pairs)}")
     ids = clip_ids.combine_chunks() if isinstance(clip_ids, pa.ChunkedArray) else clip_ids
-    a = pc.index_in(pairs["clip_a"], ids).to_numpy().astype(np.int64)
-    b = pc.index_in(pairs["clip_b"], ids).to_numpy().astype(np.int64)
+    a, b = (_places_in(ids, pairs[side]) for side in ("clip_a", "clip_b"))
     return places_of(np.minimum(a, b), np.maximum(a, b), count)
+
+
+def _places_in(ids: pa.Array, column: pa.ChunkedArray) -> NDArray[np.int64]:
+    """Find the place of every value of a column; each chunk looks its few different values up."""
+    places = [np.empty(0, dtype=np.int64)]
+    for chunk in column.chunks:
+        codes = chunk.dictionary_encode()
+        known = pc.index_in(codes.dictionary, ids).to_numpy(zero_copy_only=False).astype(np.int64)
+        places.append(known[codes.indices.to_numpy(zero_copy_only=False)])
+    return np.concatenate(places)
 
 
 def condensed(pairs: pa.Table, column: str, places: NDArray[np.int64]) -> NDArray[np.float64]:
