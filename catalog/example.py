@@ -17,7 +17,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from motionary.catalog.errors import CatalogError, nearest
-from motionary.catalog.places import batch_of, clip_rows
+from motionary.catalog.places import batch_of, rows_by_clip
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.stages.columns import matrix, per_clip
 
@@ -145,14 +145,14 @@ def clip_seconds(catalog: Catalog) -> dict[str, float]:
 
 
 def _catalogued(catalog: Catalog, clip_id: str, seconds: float) -> Example:
-    merged = clip_rows(catalog, "resampled", clip_id)
+    merged, plain = (next(rows_by_clip(catalog, table, [clip_id]))[1] for table in ("resampled", "features"))
     return Example(
         name=clip_id,
         clip_id=clip_id,
         features=matrix(merged["feature"]),
         first_frame=merged["first_frame"].to_numpy(),
         last_frame=merged["last_frame"].to_numpy(),
-        pose=matrix(clip_rows(catalog, "features", clip_id)["feature"]),
+        pose=matrix(plain["feature"]),
         seconds=seconds,
     )
 

@@ -23,6 +23,7 @@ from motionary.catalog.data_card import write_card
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.export_choice import rows_of, with_column
 from motionary.catalog.export_plan import ONE_FILE, ExportPlan
+from motionary.catalog.places import rows_by_part
 from motionary.pipeline.stages.columns import per_clip
 from motionary.pipeline.stages.motions import read_motion_rows
 from motionary.pipeline.writers import motion_line, whole_file, write_bvh, write_csv, write_npz
@@ -68,19 +69,9 @@ def write_export(plan: ExportPlan) -> Iterator[ExportedClip]:
             raise _cannot_write(plan.folder, error) from error
 
 
-def _parts(plan: ExportPlan) -> Iterator[pa.Table]:
-    """Read the poses of a plan's clips, one part of the catalog at a time."""
-    wanted = pc.field("clip_id").isin(plan.clips["clip_id"].combine_chunks())
-    store = plan.catalog.store
-    for file in plan.catalog.files(plan.table):
-        part = pq.read_table(store.path(file), filesystem=store.filesystem, filters=wanted)
-        if len(part):
-            yield part
-
-
 def _clips(plan: ExportPlan) -> Iterator[tuple[dict, pa.Table]]:
     """Read a plan's clips: what is known of each, and its poses."""
-    for part in _parts(plan):
+    for part in rows_by_part(plan.catalog, plan.table, plan.paths):
         poses = per_clip(part)
         for clip in rows_of(plan.clips, list(poses)).to_pylist():
             yield clip, poses[clip["clip_id"]]
@@ -135,7 +126,7 @@ def _tables(plan: ExportPlan) -> Iterator[ExportedClip]:
         with whole_file(plan.folder / "clips.parquet") as temporary:
             pq.write_table(plan.clips, temporary, compression="zstd")
         with ExitStack() as stack:
-            for part in _parts(plan):
+            for part in rows_by_part(plan.catalog, plan.table, plan.paths):
                 rows, about = part, rows_of(plan.clips.select(["clip_id", *known]), part["clip_id"])
                 for name in known:
                     rows = with_column(rows, about, name)

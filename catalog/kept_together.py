@@ -25,7 +25,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from motionary.catalog.errors import CatalogError, nearest
-from motionary.catalog.motions import rows_by_clip
+from motionary.catalog.places import rows_by_clip
 from motionary.catalog.query import Catalog
 from motionary.pipeline.stages.columns import matrix
 

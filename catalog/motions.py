@@ -8,48 +8,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
-
 from motionary.catalog.damage import named_if_damaged
-from motionary.catalog.places import batch_of
+from motionary.catalog.places import rows_by_clip
 from motionary.pipeline.motion import FloatArray, Motion
-from motionary.pipeline.stages.columns import matrix, per_clip
+from motionary.pipeline.stages.columns import matrix
 from motionary.pipeline.stages.motions import read_motion_rows
 
 if TYPE_CHECKING:
     from motionary.catalog.query import Catalog
-
-
-def rows_by_clip(
-    catalog: Catalog, table: str, clip_ids: Collection[str], columns: list[str] | None = None
-) -> Iterator[tuple[str, pa.Table]]:
-    """Read the rows of chosen clips, a part of the catalog at a time, in the order they are stored in.
-
-    Parameters
-    ----------
-    catalog : Catalog
-    table : str
-        One that has a part a batch: frames, aligned, features or resampled.
-    clip_ids : collection of str
-    columns : list of str, optional
-        Beside `clip_id`; all by default.
-    """
-    batch, files, store = batch_of(catalog), catalog.files(table), catalog.store
-    wanted: dict[str, list[str]] = {}
-    for clip_id in sorted(clip_ids, key=lambda one: (batch[one], one)):
-        wanted.setdefault(files[batch[clip_id]], []).append(clip_id)
-    read = None if columns is None else ["clip_id", *columns]
-    for file, clips in wanted.items():
-        with named_if_damaged(store.full_path(file)):
-            part = pq.read_table(
-                store.path(file),
-                filesystem=store.filesystem,
-                columns=read,
-                filters=pc.field("clip_id").isin(clips),
-            )
-        yield from per_clip(part).items()
 
 
 def stream_motions(catalog: Catalog, clip_ids: Collection[str], aligned: bool = False) -> Iterator[Motion]:

@@ -32,7 +32,7 @@ import pyarrow.compute as pc
 from motionary.catalog.errors import CatalogError, nearest
 from motionary.catalog.example import Example, LibraryFeatures, example_of, library_features
 from motionary.catalog.joint_columns import JointColumns, joint_columns
-from motionary.catalog.places import clip_rows
+from motionary.catalog.places import rows_by_clip
 from motionary.pipeline.features import sample_times
 from motionary.pipeline.tables import table_field
 
@@ -176,7 +176,7 @@ def _columns(catalog: Catalog, library: LibraryFeatures, example: Example, found
         clip["clip_id"]: sample_times(clip["frames"], clip["fps"], frame_rate)
         for clip in clips.filter(pc.is_in(clips["clip_id"], pa.array(clip_ids, pa.string()))).to_pylist()
     }
-    spans = {clip_id: clip_rows(catalog, "resampled", clip_id) for clip_id in dict.fromkeys(clip_ids)}
+    spans = dict(rows_by_clip(catalog, "resampled", set(clip_ids), ["first_frame", "last_frame"]))
     times = [
         _span(spans[clip_id], int(first), int(last), example)
         for clip_id, first, last in zip(clip_ids, found.first, found.last, strict=True)

@@ -17,8 +17,8 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
-from motionary.pipeline.readers.errors import ReadError
-from motionary.pipeline.readers.text import is_special, shown
+from motionary.pipeline.readers.errors import ReadError, opening
+from motionary.pipeline.readers.text import shown
 
 LARGEST_ARRAY = 1 << 29
 """Bytes of an array at most: an hour of SMPL-H at 100 frames a second is 450 million."""
@@ -66,15 +66,8 @@ def read_arrays(path: Path, needed: Sequence[str], wanted: Sequence[str] = ()) -
 @contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
-        if is_special(path):
-            raise ReadError(path, None, "this is a pipe, a socket or a device", "put a file in its place")
-        with zipfile.ZipFile(path) as archive:
+        with opening(path), zipfile.ZipFile(path) as archive:
             yield archive
-    except FileNotFoundError as error:
-        raise ReadError(path, None, "there is no such file", "check the path") from error
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ReadError(path, None, f"the file cannot be read ({reason})", "check its permissions") from error
     except _DAMAGE as error:
         raise ReadError(path, None, f"this is no whole NPZ ({shown(str(error), 80)})", _AGAIN) from error
 

@@ -21,10 +21,10 @@ from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.canonical import CANONICAL_JOINTS, CANONICAL_PARENTS, Convention
 from motionary.pipeline.motion import FloatArray, Motion, Skeleton
-from motionary.pipeline.readers.errors import ReadError
+from motionary.pipeline.readers.errors import ReadError, opening
 from motionary.pipeline.readers.extent import check_extent
 from motionary.pipeline.readers.markers import joints_of
-from motionary.pipeline.readers.text import LARGEST, is_special, shown
+from motionary.pipeline.readers.text import LARGEST, shown
 
 _KEY = 0x50  # second byte of every C3D
 _UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0}
@@ -125,19 +125,10 @@ def _points(path: Path) -> Mapping[str, np.ndarray]:
 
 def _checked_size(path: Path) -> int:
     """Return a file's size in bytes, once it is clear that it may be a C3D."""
-    try:
-        if is_special(path):
-            raise ReadError(path, None, "this is a pipe, a socket or a device", "put a file in its place")
+    with opening(path):
         with path.open("rb") as file:
             start = file.read(2)
         size = path.stat().st_size
-    except FileNotFoundError as error:
-        raise ReadError(path, None, "there is no such file", "check the path") from error
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ReadError(
-            path, None, f"the file cannot be opened ({reason})", "check its permissions"
-        ) from error
     if len(start) < 2 or start[1] != _KEY:
         raise ReadError(path, None, "this is no C3D: its second byte is another", _AGAIN)
     return size

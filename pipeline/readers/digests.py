@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from hashlib import blake2b
 from pathlib import Path
 
-from motionary.pipeline.readers.errors import ReadError
-from motionary.pipeline.readers.text import is_special
+from motionary.pipeline.readers.errors import ReadError, is_special
 from motionary.pipeline.readers.zipped import archive_of, members_of, pieces_of, stamp_of
 
 _PIECE = 1 << 20

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 
 class ReadError(Exception):
@@ -34,3 +38,31 @@ class ReadError(Exception):
     def __str__(self) -> str:
         place = self.path if self.line is None else f"{self.path}:{self.line}"
         return f"{place}: {self.what}; {self.mend}"
+
+
+@contextmanager
+def opening(path: Path) -> Iterator[None]:
+    """Turn what the system says of a file that cannot be opened or read into one error.
+
+    Raises
+    ------
+    ReadError
+        There is no such file, it is no file but a pipe, a socket or a device, or it cannot be read.
+    """
+    try:
+        if is_special(path):
+            raise ReadError(path, None, "this is a pipe, a socket or a device", "put a file in its place")
+        yield
+    except FileNotFoundError as error:
+        raise ReadError(path, None, "there is no such file", "check the path") from error
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ReadError(
+            path, None, f"the file cannot be opened ({reason})", "check its permissions"
+        ) from error
+
+
+def is_special(path: Path) -> bool:
+    """Say whether a path leads to what is neither file nor folder; opening such a thing may wait for ever."""
+    mode = path.stat().st_mode
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))

@@ -6,14 +6,13 @@ UTF-8 with or without its byte-order mark, else Latin-1; CR, LF and CRLF, mixed;
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from motionary.pipeline.motion import FloatArray
-from motionary.pipeline.readers.errors import ReadError
+from motionary.pipeline.readers.errors import ReadError, opening
 
 LARGEST = 1e12  # beyond any unit, any angle: such a value is damage, and squares of it still are finite
 
@@ -28,17 +27,8 @@ def read_lines(path: Path) -> list[str]:
     ReadError
         The file is missing, may not be read, is empty, or is not text.
     """
-    try:
-        if is_special(path):
-            raise ReadError(path, None, "this is a pipe, a socket or a device", "put a file in its place")
+    with opening(path):
         data = path.read_bytes()
-    except FileNotFoundError as error:
-        raise ReadError(path, None, "there is no such file", "check the path") from error
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ReadError(
-            path, None, f"the file cannot be opened ({reason})", "check its permissions"
-        ) from error
     if b"\0" in data:
         line = 1 + len(re.findall(rb"\r\n?|\n", data[: data.index(b"\0")]))
         raise ReadError(
@@ -51,12 +41,6 @@ def read_lines(path: Path) -> list[str]:
     if not text.strip():
         raise ReadError(path, 1, "the file is empty", "copy or export it again")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-
-
-def is_special(path: Path) -> bool:
-    """Say whether a path leads to what is neither file nor folder; opening such a thing may wait for ever."""
-    mode = path.stat().st_mode
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def without_comment(line: str) -> str:

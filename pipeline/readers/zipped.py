@@ -24,8 +24,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 from urllib.parse import quote
 
-from motionary.pipeline.readers.errors import ReadError
-from motionary.pipeline.readers.text import is_special, shown
+from motionary.pipeline.readers.errors import ReadError, opening
+from motionary.pipeline.readers.text import shown
 
 LARGEST_MEMBER = 1 << 30
 """Bytes of a member at most."""
@@ -98,10 +98,8 @@ def pieces_of(archive: Path, name: str) -> Iterator[bytes]:
     if member.what:
         raise ReadError(path, None, member.what, member.mend)
     try:
-        with opened.file.open(member.info) as file:
+        with opening(archive), opened.file.open(member.info) as file:
             yield from _pieces(file, member.info.file_size)
-    except OSError as error:
-        raise _unreadable(Path(path), error) from error
     except _DAMAGE as error:
         what = f"it cannot be unpacked ({shown(str(error), 80)})"
         raise ReadError(path, None, what, _AGAIN) from error
@@ -160,12 +158,9 @@ def _copy(path: Path, folder: Path, originals: dict[str, Path]) -> Path:
 
 def _opened(archive: Path) -> _Archive:
     try:
-        if is_special(archive):
-            raise ReadError(archive, None, "this is a pipe, a socket or a device", "put a file in its place")
-        seen = archive.stat()
-        return _directory(str(archive), (seen.st_size, seen.st_mtime_ns, seen.st_ino), os.getpid())
-    except OSError as error:
-        raise _unreadable(archive, error) from error
+        with opening(archive):
+            seen = archive.stat()
+            return _directory(str(archive), (seen.st_size, seen.st_mtime_ns, seen.st_ino), os.getpid())
     except _DAMAGE as error:
         what = f"this is no whole zip ({shown(str(error), 80)})"
         raise ReadError(archive, None, what, _AGAIN) from error
@@ -213,10 +208,3 @@ def _pieces(file: IO[bytes], size: int) -> Iterator[bytes]:
         yield piece
     if given != size:
         raise ValueError(f"it declares {size} bytes and has {given}")
-
-
-def _unreadable(path: Path, error: OSError) -> ReadError:
-    if isinstance(error, FileNotFoundError):
-        return ReadError(path, None, "there is no such file", "check the path")
-    reason = error.strerror or str(error)
-    return ReadError(path, None, f"the file cannot be read ({reason})", "check its permissions")
