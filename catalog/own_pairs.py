@@ -7,20 +7,13 @@ and those of all clips in half that number squared. DuckDB opens hundreds of sma
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
-from dataclasses import replace
 
-import duckdb
 import pyarrow as pa
-from fsspec.implementations.local import LocalFileSystem
 
-from motionary.catalog.damage import damaged_file
-from motionary.catalog.errors import CatalogError
 from motionary.catalog.places import batch_of
 from motionary.catalog.query import Catalog
-from motionary.catalog.snapshot import Snapshot
-from motionary.catalog.store import Store
+from motionary.catalog.sql import session_of
 from motionary.pipeline.layout import Earlier
 
 _OWN = """
@@ -51,7 +44,8 @@ def own_pairs(catalog: Catalog, clip_id: str, columns: Sequence[str]) -> pa.Tabl
         A file is damaged or gone.
     """
     files = _files(catalog, batch_of(catalog)[clip_id])
-    return _reader(catalog).read(_OWN.format(columns=", ".join(columns)), files, {"clip": clip_id})
+    query = _OWN.format(columns=", ".join(columns))
+    return session_of(catalog).over("pairs", files, query, {"clip": clip_id})
 
 
 def pairs_with_batch(catalog: Catalog, batch: int, columns: Sequence[str]) -> pa.Table:
@@ -63,39 +57,12 @@ def pairs_with_batch(catalog: Catalog, batch: int, columns: Sequence[str]) -> pa
         A file is damaged or gone.
     """
     query = f"select clip_a, clip_b, {', '.join(columns)} from read_parquet($files)"
-    return _reader(catalog).read(query, _files(catalog, batch), {})
+    return session_of(catalog).over("pairs", _files(catalog, batch), query, {})
 
 
 def batch_count(catalog: Catalog) -> int:
     """Return how many batches the clips are stored in."""
     return max(batch_of(catalog).values(), default=-1) + 1
-
-
-class _Reader:
-    """A connection that remembers where in each file its columns lie; files never change."""
-
-    def __init__(self, store: Store, snapshot: Snapshot) -> None:
-        self._store, self._snapshot = store, snapshot
-        self._lock = threading.Lock()
-        self._connection = duckdb.connect()
-        self._connection.execute("set parquet_metadata_cache = true")
-        if not isinstance(store.filesystem, LocalFileSystem):
-            self._connection.register_filesystem(store.filesystem)
-
-    def read(self, query: str, files: Sequence[str], parameters: dict[str, object]) -> pa.Table:
-        listed = [self._store.full_path(file) for file in files]
-        try:
-            with self._lock:
-                asked = self._connection.sql(query, params={"files": listed, **parameters})
-                return asked.to_arrow_table()
-        except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
-            asked_of = replace(self._snapshot, tables={"pairs": files})
-            damage = damaged_file(self._store, asked_of, ["pairs"])
-            raise CatalogError(damage or f"the pairs cannot be read: {error}") from error
-
-
-def _reader(catalog: Catalog) -> _Reader:
-    return catalog.keep("pairs", lambda: _Reader(catalog.store, catalog.snapshot))
 
 
 def _files(catalog: Catalog, batch: int) -> list[str]:

@@ -16,6 +16,7 @@ from motionary.catalog.motions import stream_motions
 from motionary.catalog.opening import open_snapshot
 from motionary.catalog.selection import Selection, Wanted
 from motionary.catalog.snapshot import Snapshot, snapshot_ids
+from motionary.catalog.sql import SESSION, session_of
 from motionary.catalog.store import Store
 from motionary.catalog.table import CatalogTable
 from motionary.pipeline.config import PipelineConfig, config_of
@@ -117,7 +118,7 @@ class Catalog:
     def close(self) -> None:
         """Give the snapshot up, which vacuum may then remove, and what was kept in memory."""
         with self._keeping:
-            session = self._kept.pop("sql", None)
+            session = self._kept.pop(SESSION, None)
             self._kept.clear()
         if session is not None:
             session.close()
@@ -200,10 +201,7 @@ class Catalog:
         CatalogError
             The query is not valid, with DuckDB's message; or a file of the catalog is damaged.
         """
-        from motionary.catalog.sql import SqlSession
-
-        session = self.keep("sql", lambda: SqlSession(self.store, self.snapshot))
-        return session.answer(query, parameters)
+        return session_of(self).answer(query, parameters)
 
     def describe(self) -> Description:
         """Sum up what the catalog holds."""

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 from fsspec.implementations.local import LocalFileSystem
@@ -19,8 +22,16 @@ from motionary.catalog.schema import PUBLISHED, SCHEMAS
 from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
 
+if TYPE_CHECKING:
+    import duckdb
+
+    from motionary.catalog.query import Catalog
+
 TAKES = "takes"
 """The view of every clip with its cluster: `clips`, but for their skeletons, joined with `clusters`."""
+
+SESSION = "sql"
+"""What a catalog keeps its session by."""
 
 Parameters = Sequence[object] | Mapping[str, object]
 
@@ -45,6 +56,7 @@ class SqlSession:
         self._connection = duckdb.connect()
         if not isinstance(store.filesystem, LocalFileSystem):
             self._connection.register_filesystem(store.filesystem)
+        self._connection.execute("set parquet_metadata_cache = true")  # files never change
         # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.
         home = _text(store.full_path("").rstrip("/") + "/")
         self._connection.execute(f"set allowed_directories = [{home}]")
@@ -61,24 +73,44 @@ class SqlSession:
         """
         import duckdb
 
-        try:
-            with self._connection.cursor() as cursor:
-                statements = cursor.extract_statements(query)
-                if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
-                    raise CatalogError("a catalog is only read: give one statement that selects")
-                self._make_views(_named_in(query))
-                return cursor.sql(query, params=parameters).to_arrow_table()
-        # RuntimeError: what DuckDB says of a damaged file can be no text.
-        except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
-            wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
-            damage = (
-                None if isinstance(error, wrong) else damaged_file(self._store, self._snapshot, PUBLISHED)
-            )
-            raise CatalogError(damage or f"the query cannot be answered: {error}") from error
+        with self._asking(self._snapshot) as cursor:
+            statements = cursor.extract_statements(query)
+            if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
+                raise CatalogError("a catalog is only read: give one statement that selects")
+            self._make_views(_named_in(query))
+            return cursor.sql(query, params=parameters).to_arrow_table()
+
+    def over(
+        self, table: str, files: Sequence[str], query: str, parameters: Mapping[str, object]
+    ) -> pa.Table:
+        """Ask about some part files of a table alone; in the query `$files` stands for them.
+
+        Raises
+        ------
+        CatalogError
+            One of them is damaged or gone.
+        """
+        listed = [self._store.full_path(file) for file in files]
+        with self._asking(replace(self._snapshot, tables={table: files})) as cursor:
+            return cursor.sql(query, params={"files": listed, **parameters}).to_arrow_table()
 
     def close(self) -> None:
         """Give the connection's memory back."""
         self._connection.close()
+
+    @contextmanager
+    def _asking(self, snapshot: Snapshot) -> Iterator[duckdb.DuckDBPyConnection]:
+        """Give a cursor, and turn what is raised into an error that names the damaged file of a snapshot."""
+        import duckdb
+
+        try:
+            with self._connection.cursor() as cursor:
+                yield cursor
+        # RuntimeError: what DuckDB says of a damaged file can be no text.
+        except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
+            wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
+            damage = None if isinstance(error, wrong) else damaged_file(self._store, snapshot, PUBLISHED)
+            raise CatalogError(damage or f"the query cannot be answered: {error}") from error
 
     def _make_views(self, names: set[str]) -> None:
         tables = {one for name in names for one in _JOINED.get(name, (name,))}
@@ -103,6 +135,11 @@ class SqlSession:
         taken = {"skeleton", *SCHEMAS["clusters"].names} - {"clip_id"}
         own = ", ".join(quoted(one) for one in self._connection.table("clips").columns if one not in taken)
         return f"select * from (select {own} from clips) join clusters using (clip_id)"
+
+
+def session_of(catalog: Catalog) -> SqlSession:
+    """Return the session of an opened catalog, which lasts until it is closed."""
+    return catalog.keep(SESSION, lambda: SqlSession(catalog.store, catalog.snapshot))
 
 
 def _named_in(query: str) -> set[str]:
