@@ -41,7 +41,7 @@ _INGESTED = [
     _CLIP,
     table_field("path", pa.string(), "path in the library folder"),
     table_field("digest", pa.string(), "BLAKE2b of the bytes of every file the clip is read from"),
-    table_field("format", pa.string(), "bvh or asf/amc"),
+    table_field("format", pa.string(), "bvh, asf/amc, amass or c3d"),
     table_field("fps", pa.float64(), "frame rate of the source", "1/s"),
     table_field("frames", pa.int32(), "frames kept of the source"),
     table_field("seconds", pa.float64(), "from the first frame to the last", "s"),
@@ -54,7 +54,11 @@ _INGESTED = [
 
 _POSE = [
     table_field("root_position", pa.list_(pa.float32(), 3), "root joint in the world", "source units"),
-    table_field("rotations", _FLOATS, "local unit quaternions x y z w, joint by joint"),
+    table_field(
+        "rotations",
+        _FLOATS,
+        "local unit quaternions x y z w, joint by joint; of markers the joints' places from the root, x y z",
+    ),
 ]
 
 _REFERENCE = [

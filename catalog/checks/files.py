@@ -91,10 +91,13 @@ def _unlike(table: str, schema: pa.Schema) -> list[str]:
         there = schema.field(field.name)
         if there.type != field.type or there.nullable != field.nullable:
             wrong.append(f"column {field.name} is {_described(there)}, not {_described(field)}")
-        # Parquet adds a key of its own (the field's number), so that ours are looked up one by one.
-        elif any((there.metadata or {}).get(key) != value for key, value in field.metadata.items()):
+        elif not _said(there, b"meaning") or _said(there, b"unit") != _said(field, b"unit"):
             wrong.append(f"column {field.name} lacks its unit or meaning")
     return wrong
+
+
+def _said(field: pa.Field, key: bytes) -> bytes | None:
+    return (field.metadata or {}).get(key)
 
 
 def _described(field: pa.Field) -> str:

@@ -21,7 +21,7 @@ from motionary.pipeline.stages.columns import carried_rows, renamed, vectors
 from motionary.pipeline.stages.motions import motion_rows, skeleton_record
 from motionary.pipeline.tables import TABLES
 
-VERSION = 2
+VERSION = 3
 MAKES = ("ingested", "frames", "features", "quarantine")
 
 Tables = dict[str, pa.Table]
