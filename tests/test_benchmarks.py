@@ -207,3 +207,18 @@ def test_an_alignments_figure_is_met_from_the_right_side():
     assert not alignment.Figure("", 90, required=80).met
     assert not alignment.Figure("", float("nan"), required=80).met
     assert alignment.Figure("", 90).met is None
+
+
+def test_the_questions_benchmark_runs_on_the_catalog_that_is_there(tmp_path, demo_catalog):
+    folder, out = tmp_path / "ask", tmp_path / "made" / "ask.json"
+    folder.mkdir()
+    (folder / "catalog-80").symlink_to(demo_catalog)
+    command = [sys.executable, "-m", "tests.benchmarks.ask", "--quick", "--folder", folder, "--json", out]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    assert not (folder / "library-80").exists()
+    figures = {one["what"]: one for one in json.loads(out.read_text())["figures"]}
+    assert all(one["measured"] > 0 for one in figures.values())
+    assert {f"80 clips: {what}" for what in ("similar to a new file, ms", "files assigned a second")} <= {
+        *figures
+    }
