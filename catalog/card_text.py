@@ -35,7 +35,7 @@ def card_text(card: Mapping[str, Any]) -> str:
         _files(card),
         _split(card["split"]) if card["split"] else "",
         _sources(card),
-        f"## Labels\n\n{_counts(card['labels'], ['label'])}",
+        _labels(card["labels"]),
         f"## Clusters\n\n{_counts(card['clusters'], ['cluster_id'])}",
         _not_written(card["not_written"]),
         _settings(card),
@@ -110,6 +110,16 @@ def _sources(card: Mapping[str, Any]) -> str:
         text += "\n".join(f"- {_plain(one)}" for one in card["credits"])
     elif card["clips"] > unlicensed:
         text += "\n\nName the sources as their licences ask where you use these motions."
+    return text
+
+
+def _labels(rows: Sequence[Mapping[str, Any]]) -> str:
+    text = f"## Labels\n\n{_counts(rows, ['label', 'label_source'])}"
+    if any(row["label_source"] == "propagated" for row in rows):
+        text += (
+            "\n\n*propagated*: nobody named these clips; they are called as most of their cluster is, with "
+            "the `confidence` that `clips.jsonl` tells."
+        )
     return text
 
 

@@ -82,7 +82,7 @@ def data_card(plan: ExportPlan, clips: Sequence[Mapping], failed: Mapping[str, s
         **_totals(clips),
         "not_written": dict(failed),
         "split": plan.split and _split(plan.split, clips),
-        "labels": _summed(clips, ("label",), parts),
+        "labels": _summed(clips, ("label", "label_source"), parts),
         "clusters": _summed(clips, ("cluster_id",), parts),
         "sources": _summed(clips, _SOURCES, parts),
         "licences": _summed([clip for clip in clips if clip.get("licence")], ("licence",), parts),

@@ -7,11 +7,10 @@ Distances are computed and not looked up, so that a file can be asked about too;
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from motionary.catalog.errors import CatalogError
 from motionary.catalog.example import Example, example_of
 from motionary.catalog.explanation import CurvePoint, ExplainedClip, Explanation, Span, Zone
 from motionary.catalog.ranked_distance import ranked_distance
@@ -49,8 +48,6 @@ def explain(
     """
     from motionary.pipeline.distances.explain import explain_pair, feature_parts
 
-    if metric not in (None, *get_args(Metric)):
-        raise CatalogError(f"no metric {metric!r}; there are {', '.join(get_args(Metric))}")
     config = catalog.config
     distance = ranked_distance(config, metric)
     one, other = example_of(catalog, a), example_of(catalog, b)

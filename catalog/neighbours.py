@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 Rank = Literal["distance", "mutual"]
 
+FEW_FRAMES = 10
+"""What has fewer, low-motion ones merged, is hard to tell from other short motions."""
+
 _SCHEMA = pa.schema(
     [
         table_field("rank", pa.int32(), "from 1, the most similar first"),
@@ -65,8 +68,8 @@ class Similar:
         Clips whose distance was computed.
     pruned : int
         Clips that a bound ruled out before; with `compared` and those read from `pairs`, all of the catalog.
-    from_pairs : bool
-        Whether distances were read and none computed.
+    frames : int, optional
+        Of what was asked about, low-motion ones merged; None where distances were read and none computed.
     """
 
     name: str
@@ -74,7 +77,7 @@ class Similar:
     table: pa.Table
     compared: int
     pruned: int
-    from_pairs: bool
+    frames: int | None = None
 
     def to_pandas(self) -> pd.DataFrame:
         """Return the table as a data frame."""
@@ -92,12 +95,20 @@ class Similar:
         return table_html(repr(self), self.table)
 
     @property
+    def from_pairs(self) -> bool:
+        """Whether distances were read and none computed."""
+        return self.frames is None
+
+    @property
     def how(self) -> str:
-        """Say where the answer comes from."""
-        if self.from_pairs:
+        """Say where the answer comes from, and of how little it may be."""
+        if self.frames is None:
             return f"{self.metric}, read from table pairs"
         clips = self.compared + self.pruned
-        return f"{self.metric}, {self.compared} of {clips} clips compared, {self.pruned} ruled out by bounds"
+        told = f"{self.metric}, {self.compared} of {clips} clips compared, {self.pruned} ruled out by bounds"
+        if self.frames < FEW_FRAMES:
+            told += f"; of {self.frames} frames once those of little motion are merged: few to be known by"
+        return told
 
 
 def similar(
@@ -160,7 +171,7 @@ def similar(
     }
     table = pa.table(columns, schema=pa.schema([_SCHEMA.field(name) for name in columns]))
     return Similar(
-        os.fspath(clip_or_file), distance.metric, table, found.compared, found.pruned, found.from_pairs
+        os.fspath(clip_or_file), distance.metric, table, found.compared, found.pruned, found.frames
     )
 
 
@@ -190,7 +201,7 @@ class _Found:
     distances: NDArray[np.float32]
     compared: int = 0
     pruned: int = 0
-    from_pairs: bool = False
+    frames: int | None = None
 
 
 def _distances(
@@ -221,7 +232,7 @@ def _distances(
         tau=distance.tau,
         among=among,
     )
-    return _Found(found.index, found.distance, found.compared, found.pruned)
+    return _Found(found.index, found.distance, found.compared, found.pruned, len(example.features))
 
 
 def _stored(catalog: Catalog, clip_id: str, clip_ids: pa.Array, distance: RankedDistance) -> _Found:
@@ -233,7 +244,7 @@ def _stored(catalog: Catalog, clip_id: str, clip_ids: pa.Array, distance: Ranked
             "`motionary verify` finds what is wrong with it"
         )
     places = pc.index_in(pairs["other"].combine_chunks(), clip_ids).to_numpy().astype(np.int64)
-    return _Found(places, distance.of(pairs), from_pairs=True)
+    return _Found(places, distance.of(pairs))
 
 
 def _takes(catalog: Catalog) -> pa.Table:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from motionary.catalog.errors import CatalogError
 from motionary.pipeline.config import Metric, PipelineConfig
 from motionary.pipeline.stages.compare import thresholds_of
 
@@ -52,6 +54,13 @@ def ranked_distance(config: PipelineConfig, metric: Metric | None = None) -> Ran
         The run's.
     metric : str, optional
         By default that of the run's published clusters.
+
+    Raises
+    ------
+    CatalogError
+        There is no such metric.
     """
+    if metric not in (None, *get_args(Metric)):
+        raise CatalogError(f"no metric {metric!r}; there are {', '.join(get_args(Metric))}")
     primary: Metric = "fuzzy" if config.clusters.primary == "fuzzy" else config.clusters.metric
     return RankedDistance(metric or primary, config.clusters.fuzzy_tau, thresholds_of(config.distances))

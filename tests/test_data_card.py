@@ -61,7 +61,7 @@ def test_every_count_is_that_of_the_clips(licensed, tmp_path):
     assert card["frames"] == sum(clip["frames"] for clip in clips)
     assert card["seconds"] == pytest.approx(sum(clip["seconds"] for clip in clips), abs=1e-3)
     for table, columns in (
-        ("labels", ["label"]),
+        ("labels", ["label", "label_source"]),
         ("clusters", ["cluster_id"]),
         ("sources", ["dataset", "format", "licence"]),
     ):
@@ -111,7 +111,7 @@ def test_clips_that_were_not_written_are_not_counted(licensed, tmp_path):
 def test_a_long_table_is_cut_on_the_page_only(licensed, tmp_path):
     card, _, _ = exported(licensed, tmp_path)
     row = {"clips": 1, "seconds": 1.0}
-    card["labels"] = [{"label": f"label {number}"} | row for number in range(60)]
+    card["labels"] = [{"label": f"label {number}", "label_source": "supplied"} | row for number in range(60)]
     text = card_text(card)
     assert "label 49" in text
     assert "label 50" not in text
@@ -121,3 +121,10 @@ def test_a_long_table_is_cut_on_the_page_only(licensed, tmp_path):
 def test_an_export_without_a_card_leaves_none(licensed, tmp_path):
     licensed.export(tmp_path, "npz")
     assert {file.suffix for file in tmp_path.rglob("*")} == {".npz"}
+
+
+def test_names_that_nobody_gave_are_told_apart(licensed, tmp_path):
+    card, _, _ = exported(licensed, tmp_path)
+    assert "propagated" not in card_text(card)
+    card["labels"][0]["label_source"] = "propagated"
+    assert "nobody named these clips" in card_text(card)

@@ -806,3 +806,10 @@ def test_no_room_to_unpack_is_told(tmp_path, monkeypatch):
 
 def test_clips_are_what_a_run_reads():
     assert clips_among(["b.bvh", "a.AMC", "a.asf", "readme.txt", "LICENSE"]) == ["a.AMC", "b.bvh"]
+
+
+def test_a_wrong_file_put_there_by_hand_is_told(tmp_path):
+    (tmp_path / "a.zip").write_bytes(b"not it")
+    nobody = transfer.SetFile(name="a.zip", url="http://127.0.0.1:9/a.zip", digest=f"md5:{'0' * 32}")
+    with pytest.raises(Refused, match="what is there now, 6 bytes, has not the published digest md5:0"):
+        download(nobody, tmp_path, "http://source.example", Told())

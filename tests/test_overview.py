@@ -166,6 +166,7 @@ def test_cluster_table_agrees_with_a_count_by_hand(demo):
     for one in rows:
         inside = clusters[clusters["cluster_id"] == one["cluster_id"]]
         assert one["size"] == len(inside)
+        assert one["labelled"] == inside["label_source"].isin(["supplied", "override"]).sum()
         assert one["purity"] == pytest.approx(inside["action"].value_counts().iloc[0] / len(inside))
         assert inside.loc[inside["is_reference"], "clip_id"].tolist() == [one["reference"]]
 

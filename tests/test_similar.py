@@ -20,7 +20,9 @@ from motionary.catalog.ranked_distance import ranked_distance
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, FeatureConfig, PipelineConfig
 from motionary.pipeline.distances import compare_clips
+from motionary.pipeline.readers import read_motion
 from motionary.pipeline.stages.columns import condensed, condensed_places
+from motionary.pipeline.writers import write_bvh
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 
@@ -300,3 +302,18 @@ def test_real_clips_find_what_comparing_all_finds(shared_data, tmp_path, silent_
             ranked = distances.weighted[0].astype(np.float32)
             assert answered(catalog.similar(clip_id)) == nearest_by_sorting(ranked, clip_ids, 10, clip_id)
             assert answered(catalog.similar(library / clip_id)) == nearest_by_sorting(ranked, clip_ids, 10)
+
+
+def test_of_few_frames_it_says_so(demo_library, demo_catalog, tmp_path, motionary):
+    motion = read_motion(demo_library / "walk" / "walk_neutral_alex_01.bvh")
+    write_bvh(motion.sampled(np.arange(0.0, 6.0)), tmp_path / "step.bvh")
+    code, _, told = motionary("similar", demo_catalog, tmp_path / "step.bvh")
+    assert code == 0
+    assert "few to be known by; --within finds where in longer takes it occurs" in told
+    whole = motionary("similar", demo_catalog, demo_library / "walk" / "walk_neutral_alex_01.bvh")[2]
+    assert "few" not in whole
+
+
+def test_an_unknown_metric_is_refused(catalog):
+    with pytest.raises(CatalogError, match="no metric 'foo'; there are dtw, b_dtw, weighted, fuzzy"):
+        catalog.similar(catalog.sample(1).clip_ids[0], metric="foo")

@@ -58,7 +58,7 @@ class RunReport:
     quarantined : list of mapping
         path, line, reason, mend.
     clusters : list of mapping
-        cluster_id, label, size, purity, reference.
+        cluster_id, label, size, labelled, purity, reference.
     removed, moved, relabelled : list of mapping
         Against the snapshot before.
     limits : list of Measured

@@ -49,12 +49,13 @@ def summary_record(catalog: Catalog) -> dict[str, Any]:
 
 
 def clusters_shown(catalog: Catalog) -> RenderableType:
-    """List the published clusters: size, name, purity where labels are known, reference."""
+    """List the published clusters: size, labelled clips, name, purity where labels are known, reference."""
     clusters = cluster_table(catalog).to_pylist()
     rows = [
         [
             str(one["cluster_id"]),
             str(one["size"]),
+            str(one["labelled"]),
             one["label"] or "unnamed",
             _purity(one["purity"]),
             one["reference"],
@@ -64,7 +65,7 @@ def clusters_shown(catalog: Catalog) -> RenderableType:
     title = "Clusters"
     if len(clusters) > _MOST_CLUSTERS:
         title += f' (the {_MOST_CLUSTERS} largest of {len(clusters)}; all: select * from "references")'
-    return text_table(["cluster", "clips", "name", "purity", "reference"], rows, title)
+    return text_table(["cluster", "clips", "labelled", "name", "purity", "reference"], rows, title)
 
 
 def cut_table(catalog: Catalog) -> RenderableType:

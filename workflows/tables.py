@@ -21,7 +21,7 @@ from motionary.workflows.csv_cells import UNSAFE, csv_safe
 
 Format = Literal["table", "json", "csv", "parquet"]
 
-_WIDE = 200  # columns of a table that goes to a file or a pipe
+_WIDE = 10_000  # columns of a table that goes to a file or a pipe: no name is folded there
 _TEXTS = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary, pa.types.is_large_binary)
 
 

@@ -90,6 +90,12 @@ class ClipArrays:
             table, columns = "features", ["feature"]
         self.parts = ClipParts(selection.catalog, table, selection.clip_ids, columns, kept_parts)
 
+    @property
+    def rig_joints(self) -> NDArray[np.int64]:
+        """How many joints each clip's rig has."""
+        joints = pc.struct_field(self._clips["skeleton"], "joints")
+        return pc.list_value_length(joints).to_numpy().astype(np.int64)
+
     def read(self, place: int, start: int, stop: int) -> dict[str, NDArray[np.float32]]:
         """Read frames `start` to `stop` (not included) of the clip at a place of the selection.
 

@@ -1,5 +1,7 @@
 """Chosen clips as a map-style `torch.utils.data.Dataset`, to train with.
 
+    from motionary.catalog.adapters.nearby_shuffle import NearbyShuffle
+
     dataset = MotionDataset(catalog.filter(style="tired"), window=64, stride=16, frame_rate=30)
     loader = DataLoader(dataset, batch_size=32, sampler=NearbyShuffle(dataset), num_workers=2)
 
@@ -83,7 +85,7 @@ class MotionDataset(_DATASET):
         torch is not installed, a clip is not aligned, or there is no such column.
     ValueError
         An option is out of its range, a clip's label is not in the vocabulary, or windows are asked of clips
-        of different frame rates.
+        of different frame rates or, as rotations, of rigs with different joints.
     """
 
     def __init__(
@@ -112,6 +114,8 @@ class MotionDataset(_DATASET):
         self._cluster_of = takes["cluster_id"].to_pylist()
         if window is not None:
             _require_one_rate(self._arrays.rates)
+            if representation == "rotations":
+                _require_one_rig(self._arrays.rig_joints)
         self._clip, self._start, self._frames = _windows(self._arrays.frames, window, stride)
         self.kept_parts = kept_parts
         files = [self._arrays.parts.file_of[clip_id] for clip_id in self.clip_ids]
@@ -211,3 +215,11 @@ def _windows(
     clip = np.repeat(np.arange(len(frames)), counts)
     start = (np.arange(len(clip)) - np.repeat(np.cumsum(counts) - counts, counts)) * stride
     return clip, start, np.full(len(clip), window)
+
+
+def _require_one_rig(joints: NDArray[np.int64]) -> None:
+    if len(found := np.unique(joints)) > 1:
+        raise ValueError(
+            f"windows of rotations are asked of rigs with {', '.join(map(str, found))} joints; choose clips "
+            "of one rig, or take positions"
+        )

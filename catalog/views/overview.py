@@ -78,6 +78,7 @@ def _clusters(catalog: Catalog) -> str:
             one["cluster_id"],
             one["label"] or "unnamed",
             one["size"],
+            one["labelled"],
             "-" if one["purity"] is None else f"{one['purity']:.2f}",
             one["reference"],
         ]
@@ -95,9 +96,9 @@ def _clusters(catalog: Catalog) -> str:
     ]
     return section(
         "Clusters",
-        "Clips that move alike. Purity is the share of the commonest own label; the reference is the "
-        "clip that the others are aligned to.",
-        table(["", "cluster", "name", "clips", "purity", "reference"], cells),
+        "Clips that move alike. Labelled are those with a label of their own, and purity is the share of "
+        "the commonest of these; the reference is the clip that the others are aligned to.",
+        table(["", "cluster", "name", "clips", "labelled", "purity", "reference"], cells),
         '<p class="quiet after">The clips of each cluster, nearest to its reference first:</p>',
         *lists,
     )

@@ -19,7 +19,7 @@ from motionary.workflows.commands.options import (
 
 EXAMPLES = {
     "assign": (
-        "motionary assign CATALOG new_take.bvh  # its cluster, its name, and how sure that is",
+        "motionary assign CATALOG new_take.bvh  # its cluster, what it is called there, or that it is new",
         "motionary assign CATALOG FOLDER --format csv > names.csv  # every motion file below it",
         "motionary assign CATALOG 'takes/**/*.bvh' --format json | jq '.[].label'",
     )

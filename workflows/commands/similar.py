@@ -83,13 +83,17 @@ def _similar(
     catalog: Catalog, clip_or_file: str, k: int, metric: Metric | None, joints: str | None, rank: Rank
 ) -> tuple[pa.Table, str]:
     from motionary.catalog.example import clip_seconds
+    from motionary.catalog.neighbours import FEW_FRAMES
     from motionary.catalog.neighbours import similar as similar_clips
 
     if joints is not None or clip_or_file not in clip_seconds(catalog):
         compile_first()
     chosen = None if joints is None else _checked_joints(catalog, joints)
     found = similar_clips(catalog, clip_or_file, k, metric=metric, joints=chosen, rank=rank)
-    return found.table, f"{found.name}: {found.how}"
+    hint = ""
+    if found.frames is not None and found.frames < FEW_FRAMES:
+        hint = "; --within finds where in longer takes it occurs"
+    return found.table, f"{found.name}: {found.how}{hint}"
 
 
 def _checked_joints(catalog: Catalog, joints: str) -> list[str]:

@@ -28,10 +28,8 @@ from motionary.workflows.fetch.registry import FetchError, SetFile
 TIMEOUT = (10.0, 60.0)
 """Seconds to wait for a connection, and for the next bytes."""
 
-_PAUSE, _ATTEMPTS = (
-    1.0,
-    10,
-)  # seconds between, and how often an attempt that got further is followed by another
+# Seconds between attempts, and how often one that got further is followed by another.
+_PAUSE, _ATTEMPTS = 1.0, 10
 _CHUNK = 2**14  # what a broken connection can cost
 _BROKEN = (requests.ConnectionError, requests.exceptions.ChunkedEncodingError)
 _MISSING, _BEYOND, _PARTIAL = 404, 416, 206  # HTTP
@@ -70,6 +68,10 @@ def download(file: SetFile, folder: Path, source: str, meter: Meter) -> Path:
         if file.digest and not _has_digest(place, *file.digest.split(":")):
             raise FetchError(f"{place} has not the published digest {file.digest}; {by_hand}")
         return place
+    if place.exists() and file.digest and not _has_digest(place, *file.digest.split(":")):
+        by_hand += (
+            f"; what is there now, {place.stat().st_size:,} bytes, has not the published digest {file.digest}"
+        )
     pooch.get_logger().setLevel("WARNING")  # what it would say, the meter shows
     again = f"run this again to go on with it, {by_hand}"
     try:
