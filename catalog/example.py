@@ -120,7 +120,13 @@ def example_from_motion(catalog: Catalog, motion: Motion, name: str) -> Example:
 
 
 def library_features(catalog: Catalog) -> LibraryFeatures:
-    """Return the vectors of all clips, read once and kept while the catalog is open."""
+    """Return the vectors of all clips, read once and kept while the catalog is open.
+
+    Raises
+    ------
+    CatalogError
+        There are no clips.
+    """
 
     def read() -> LibraryFeatures:
         clips = {
@@ -128,6 +134,8 @@ def library_features(catalog: Catalog) -> LibraryFeatures:
             for file in catalog.files("resampled")
             for clip_id, rows in per_clip(catalog.store.read([file])).items()
         }
+        if not clips:
+            raise CatalogError(f"{catalog.store.url} has no clips, and so nothing to compare with")
         clip_ids = sorted(clips)
         return LibraryFeatures(clip_ids, [clips[clip_id] for clip_id in clip_ids])
 

@@ -94,6 +94,9 @@ def _listed(one: Asked) -> Iterator[Given]:
 
 
 def _on_disk(name: str) -> Iterator[Given]:
+    if not name:  # which Path takes for the working directory
+        yield Given(name, Unreadable(None, "the name is empty", "name a file, a folder or a pattern"))
+        return
     path = Path(name)
     try:
         folder, file = path.is_dir(), path.is_file()

@@ -31,7 +31,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.catalog.errors import CatalogError
 from motionary.catalog.example import library_features
 from motionary.catalog.ranked_distance import RankedDistance, ranked_distance
 from motionary.pipeline.config import PipelineConfig
@@ -112,8 +111,6 @@ def read_clusters(catalog: Catalog) -> Clusters:
     from motionary.catalog.neighbours import packed_library
 
     library, reach = library_features(catalog), catalog.config.clusters.reach
-    if not library.clip_ids:
-        raise CatalogError(f"{catalog.store.url} has no clips, and so no clusters to assign anything to")
     packed, ranked = packed_library(catalog), ranked_distance(catalog.config)
     found = catalog.sql(_CLUSTERS).to_pydict()
     of_clip = catalog.sql("select clip_id, cluster_id from clusters").to_pydict()

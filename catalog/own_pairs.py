@@ -18,7 +18,7 @@ from motionary.pipeline.layout import Earlier
 
 _OWN = """
     select if(clip_a = $clip, clip_b, clip_a) as other, {columns}
-    from read_parquet($files) where clip_a = $clip or clip_b = $clip
+    from {files} where clip_a = $clip or clip_b = $clip
 """
 
 
@@ -44,7 +44,7 @@ def own_pairs(catalog: Catalog, clip_id: str, columns: Sequence[str]) -> pa.Tabl
         A file is damaged or gone.
     """
     files = _files(catalog, batch_of(catalog)[clip_id])
-    query = _OWN.format(columns=", ".join(columns))
+    query = _OWN.replace("{columns}", ", ".join(columns))
     return session_of(catalog).over("pairs", files, query, {"clip": clip_id})
 
 
@@ -56,7 +56,7 @@ def pairs_with_batch(catalog: Catalog, batch: int, columns: Sequence[str]) -> pa
     CatalogError
         A file is damaged or gone.
     """
-    query = f"select clip_a, clip_b, {', '.join(columns)} from read_parquet($files)"
+    query = f"select clip_a, clip_b, {', '.join(columns)} from {{files}}"
     return session_of(catalog).over("pairs", _files(catalog, batch), query, {})
 
 

@@ -16,7 +16,7 @@ from motionary.catalog.motions import stream_motions
 from motionary.catalog.opening import open_snapshot
 from motionary.catalog.selection import Selection, Wanted
 from motionary.catalog.snapshot import Snapshot, snapshot_ids
-from motionary.catalog.sql import SESSION, session_of
+from motionary.catalog.sql import session_of
 from motionary.catalog.store import Store
 from motionary.catalog.table import CatalogTable
 from motionary.pipeline.config import PipelineConfig, config_of
@@ -93,8 +93,7 @@ class Catalog:
         self.store = store
         self.snapshot = snapshot
         self.lease = lease
-        self._kept: dict[str, Any] = {}
-        self._keeping = threading.RLock()
+        self._start_keeping()
 
     @classmethod
     def open(cls, url: str | os.PathLike[str], snapshot: int | str | None = None) -> Catalog:
@@ -118,10 +117,7 @@ class Catalog:
     def close(self) -> None:
         """Give the snapshot up, which vacuum may then remove, and what was kept in memory."""
         with self._keeping:
-            session = self._kept.pop(SESSION, None)
-            self._kept.clear()
-        if session is not None:
-            session.close()
+            self._kept = {}
         if self.lease is not None:
             self.lease.release()
 
@@ -136,10 +132,17 @@ class Catalog:
 
     def keep(self, key: str, make: Callable[[], T]) -> T:
         """Return what is asked for again and again, made when it is first asked for, until `close`."""
+        if self._process != os.getpid():  # threads and connections do not come along into a forked process
+            self._left = self._kept  # nor can they be ended there
+            self._start_keeping()
         with self._keeping:
             if key not in self._kept:
                 self._kept[key] = make()
             return self._kept[key]
+
+    def _start_keeping(self) -> None:
+        self._kept: dict[str, Any] = {}
+        self._keeping, self._process = threading.RLock(), os.getpid()
 
     def snapshots(self) -> list[str]:
         """List the ids of the snapshots that are there, oldest first."""

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 TAKES = "takes"
 """The view of every clip with its cluster: `clips`, but for their skeletons, joined with `clusters`."""
 
-SESSION = "sql"
-"""What a catalog keeps its session by."""
-
 Parameters = Sequence[object] | Mapping[str, object]
 
 _JOINED = {TAKES: ("clips", "clusters")}
@@ -57,6 +54,7 @@ class SqlSession:
         if not isinstance(store.filesystem, LocalFileSystem):
             self._connection.register_filesystem(store.filesystem)
         self._connection.execute("set parquet_metadata_cache = true")  # files never change
+        self._connection.execute("set temp_directory = ''")  # which a query may read and write as well
         # A query reads this catalog's files and nothing else, writes nowhere and loads nothing.
         home = _text(store.full_path("").rstrip("/") + "/")
         self._connection.execute(f"set allowed_directories = [{home}]")
@@ -78,12 +76,14 @@ class SqlSession:
             if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
                 raise CatalogError("a catalog is only read: give one statement that selects")
             self._make_views(_named_in(query))
+            # DuckDB takes `with x as (copy ... to ...)` for a selection, but not within another.
+            cursor.execute(f"explain from (\n{statements[0].query.rstrip().removesuffix(';')}\n)", parameters)
             return cursor.sql(query, params=parameters).to_arrow_table()
 
     def over(
         self, table: str, files: Sequence[str], query: str, parameters: Mapping[str, object]
     ) -> pa.Table:
-        """Ask about some part files of a table alone; in the query `$files` stands for them.
+        """Ask about some part files of a table alone; in the query `{files}` stands for them.
 
         Raises
         ------
@@ -92,11 +92,10 @@ class SqlSession:
         """
         listed = [self._store.full_path(file) for file in files]
         with self._asking(replace(self._snapshot, tables={table: files})) as cursor:
-            return cursor.sql(query, params={"files": listed, **parameters}).to_arrow_table()
-
-    def close(self) -> None:
-        """Give the connection's memory back."""
-        self._connection.close()
+            reading = "read_parquet($files, hive_partitioning = false)"
+            return cursor.sql(
+                query.format(files=reading), params={"files": listed, **parameters}
+            ).to_arrow_table()
 
     @contextmanager
     def _asking(self, snapshot: Snapshot) -> Iterator[duckdb.DuckDBPyConnection]:
@@ -128,18 +127,19 @@ class SqlSession:
         listed = ", ".join(_text(self._store.full_path(file)) for file in self._snapshot.tables[table])
         # Parts of `clips` alone may differ in columns, those of labels.
         by_name = "true" if table == "clips" else "false"
-        return f"from read_parquet([{listed}], union_by_name = {by_name})"
+        return f"from read_parquet([{listed}], union_by_name = {by_name}, hive_partitioning = false)"
 
     def _joining(self) -> str:
         """Select clips with their clusters; skeletons, and labels called as a column there, are left out."""
         taken = {"skeleton", *SCHEMAS["clusters"].names} - {"clip_id"}
-        own = ", ".join(quoted(one) for one in self._connection.table("clips").columns if one not in taken)
+        columns = self._connection.table("clips").columns
+        own = ", ".join(quoted(one) for one in columns if one.lower() not in taken)  # SQL knows no capitals
         return f"select * from (select {own} from clips) join clusters using (clip_id)"
 
 
 def session_of(catalog: Catalog) -> SqlSession:
-    """Return the session of an opened catalog, which lasts until it is closed."""
-    return catalog.keep(SESSION, lambda: SqlSession(catalog.store, catalog.snapshot))
+    """Return the session of an opened catalog, which lasts until it is closed and the last answer given."""
+    return catalog.keep("sql", lambda: SqlSession(catalog.store, catalog.snapshot))
 
 
 def _named_in(query: str) -> set[str]:

@@ -16,7 +16,7 @@ import os
 import posixpath
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,15 @@ class Store:
     """
 
     url: str
+    _home: str = field(init=False, repr=False, compare=False, default="")
+
+    def __post_init__(self) -> None:
+        if not self._is_elsewhere:  # where it lies does not change with the working directory
+            object.__setattr__(self, "_home", LocalFileSystem._strip_protocol(self.url))
+
+    @property
+    def _is_elsewhere(self) -> bool:
+        return "://" in self.url  # fsspec would take `::` in a folder's name for a chain of URLs
 
     @property
     def filesystem(self) -> Any:
@@ -78,8 +87,8 @@ class Store:
         return posixpath.join(self._located()[1], *names)
 
     def _located(self) -> tuple[Any, str]:
-        if "://" not in self.url:  # fsspec would take `::` in a folder's name for a chain of URLs
-            return LocalFileSystem(), LocalFileSystem._strip_protocol(self.url)
+        if not self._is_elsewhere:
+            return LocalFileSystem(), self._home
         try:
             # Others write there too: a listing that was remembered would hide what they did.
             return fsspec.core.url_to_fs(self.url, use_listings_cache=False)

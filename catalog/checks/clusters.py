@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from motionary.catalog.checks.found import Found, has, wrong_rows
 from motionary.catalog.query import Catalog
+from motionary.catalog.sql import quoted
 
 
 def clusters_hold_every_clip(catalog: Catalog) -> Found:
@@ -71,7 +72,7 @@ def labels_are_consistent(catalog: Catalog) -> Found:
     join = "left join labels o using (clip_id)" if has(catalog, "labels") else ""
     source = f"""select c.*, {supplied} as supplied, {said} as override, r.label as name
                  from clusters c left join clips using (clip_id) {join}
-                 left join "references" r using (cluster_id)"""
+                 left join "references" r on r.cluster_id = c.cluster_id"""
     rules = {
         "label_source not in ('override', 'supplied', 'propagated', 'unassigned')": "of an unknown source",
         "override is not null and label_source <> 'override'": "while a person said otherwise",
@@ -105,4 +106,4 @@ def _supplied(catalog: Catalog) -> str:
     """Name the column of supplied labels in SQL, or nothing where none of that name were supplied."""
     column = catalog.settings["clusters"]["label_column"]
     known = catalog.sql("from clips limit 0").column_names
-    return 'clips."' + column.replace('"', '""') + '"' if column in known else "cast(null as varchar)"
+    return f"clips.{quoted(column)}" if column in known else "cast(null as varchar)"
