@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from motionary.catalog.query import Catalog
 
-Wanted = str | float | bool | Collection[str | float] | None
+Wanted = str | float | bool | Collection[str | float | None] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +69,7 @@ class Selection:
             Bounds of the length, included.
         **columns
             Any column of `clips` or `clusters`, such as `label`, `cluster_id` or a supplied label: the value
-            it has, one of several values, or None where it has none.
+            it has, one of several values, None where it has none.
 
         Raises
         ------
@@ -137,7 +137,8 @@ def _condition(column: str, value: Wanted, number: int, parameters: dict[str, ob
     if value is None:
         return f"{column} is null"
     if isinstance(value, Collection) and not isinstance(value, str):
-        parameters[f"p{number}"] = [*value]
-        return f"{column} in (select unnest($p{number}))"
+        parameters[f"p{number}"] = [one for one in value if one is not None]
+        among = f"{column} in (select unnest($p{number}))"
+        return f"({among} or {column} is null)" if None in value else among
     parameters[f"p{number}"] = value
     return f"{column} = $p{number}"

@@ -34,6 +34,7 @@ def test_filters_are_a_loop_over_the_rows(catalog):
         (catalog.filter(style=["tired", "proud"]), lambda row: row["style"] in ("tired", "proud")),
         (catalog.filter(cluster_id={1, 2}), lambda row: row["cluster_id"] in (1, 2)),
         (catalog.filter(licence=None), lambda row: row["licence"] is None),
+        (catalog.filter(licence=["mine", None]), lambda row: row["licence"] in ("mine", None)),
         (catalog.filter(is_reference=True), lambda row: row["is_reference"]),
         (catalog.filter(min_seconds=2), lambda row: row["seconds"] >= 2),
         (
