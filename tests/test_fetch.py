@@ -17,7 +17,7 @@ import threading
 import time
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -36,6 +36,8 @@ from motionary.workflows.fetch.transfer import Resuming, download
 from motionary.workflows.fetch.unpack import unpack
 
 BIG = bytes(range(256)) * 4096  # a megabyte
+ENDLESS = 2**26  # where a test fails, the disk is not to be filled
+LASTING = {"length": False, "endless": True}
 PIECE = 2**18  # in whole chunks: of one that is broken off nothing is kept
 
 
@@ -48,6 +50,11 @@ class Offer:
     etag: str | None = '"one"'
     status: int = 200
     length: bool = True  # whether it says how long the file is
+    chunked: bool = False
+    packed: str | None = None  # the Content-Encoding that it claims
+    endless: bool = False
+    step: int | None = None  # the most that a part has
+    of: int | None = None  # the complete size that it says with a part, instead of the true one
     breaks_after: list[int] = field(default_factory=list)  # bytes sent by the first, second, ... answer
     hangs: bool = False
 
@@ -73,7 +80,8 @@ def site(monkeypatch) -> Iterator[Site]:
 
     class Answers(BaseHTTPRequestHandler):
         def do_GET(self):
-            answer(self, made)
+            with suppress(ConnectionError):  # of who has heard enough
+                answer(self, made)
 
         def log_message(self, *arguments):
             pass
@@ -106,18 +114,26 @@ def answer(request: BaseHTTPRequestHandler, site: Site) -> None:
         request.send_header("Content-Range", f"bytes */{size}")
         request.end_headers()
         return
+    end = min(start + offer.step, size) if start and offer.step else size
     request.send_response(206 if start else 200)
     if start:
-        request.send_header("Content-Range", f"bytes {start}-{size - 1}/{size}")
-    if offer.length:
-        request.send_header("Content-Length", str(size - start))
+        request.send_header("Content-Range", f"bytes {start}-{end - 1}/{offer.of or size}")
+    if offer.packed:
+        request.send_header("Content-Encoding", offer.packed)
+    if offer.chunked:
+        request.send_header("Transfer-Encoding", "chunked")
+    elif offer.length:
+        request.send_header("Content-Length", str(end - start))
     if offer.etag:
         request.send_header("ETag", offer.etag)
     request.end_headers()
-    stop = start + offer.breaks_after.pop(0) if offer.breaks_after else size
+    stop = start + offer.breaks_after.pop(0) if offer.breaks_after else end
     sent = offer.content[start:stop]
+    while offer.endless and site.sent < ENDLESS:
+        request.wfile.write(sent)
+        site.sent += len(sent)
     site.sent += len(sent)
-    request.wfile.write(sent)
+    request.wfile.write(b"%x\r\n%b\r\n0\r\n\r\n" % (len(sent), sent) if offer.chunked else sent)
 
 
 class Told:
@@ -142,6 +158,13 @@ def get(site: Site, folder: Path, name: str = "a.zip", meter=None, **fields) -> 
     folder.mkdir(exist_ok=True)
     one = transfer.SetFile(**{"name": name, "url": site.url(name), **fields})
     return download(one, folder, "http://source.example", meter or Told())
+
+
+def part_of(site: Site, folder: Path, content: bytes) -> None:
+    """Leave what an earlier call would have of a file of the site."""
+    (folder / "a.zip.part").write_bytes(content)
+    note = {"url": site.url("a.zip"), "validator": '"one"'}
+    (folder / "a.zip.part.json").write_text(json.dumps(note))
 
 
 def zipped(files: dict[str, bytes]) -> bytes:
@@ -472,6 +495,90 @@ def test_another_size_than_documented_is_refused_before_it_comes(tmp_path, site)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("offer", [{"length": False}, {"chunked": True}, LASTING])
+def test_more_than_the_documented_size_is_not_read(tmp_path, site, offer):
+    site.offers["a.zip"] = Offer(BIG, **offer)
+    told = Told()
+    with pytest.raises(Refused, match="of more than 20,000 bytes, but 20,000 are documented"):
+        get(site, tmp_path, meter=told, bytes=20_000)
+    assert told.count <= 20_000
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_less_than_the_documented_size_is_refused_once_it_is_whole(tmp_path, site):
+    site.offers["a.zip"] = Offer(BIG, chunked=True)
+    with pytest.raises(Refused, match="of 1,048,576 bytes, but 2,000,000 are documented"):
+        get(site, tmp_path, bytes=2_000_000)
+    assert (len(site.asked), list(tmp_path.iterdir())) == (1, [])
+
+
+@pytest.mark.parametrize("offer", [{"length": False}, {"chunked": True}])
+def test_the_documented_size_is_taken_however_it_comes(tmp_path, site, offer):
+    site.offers["a.zip"] = Offer(BIG, **offer)
+    assert get(site, tmp_path, bytes=len(BIG)).read_bytes() == BIG
+
+
+@pytest.mark.parametrize("size", [1000, 1500])
+def test_a_part_that_a_server_calls_complete_is_held_against_the_documented_size(tmp_path, site, size):
+    site.offers["a.zip"] = Offer(BIG[:500])
+    part_of(site, tmp_path, BIG[:500])
+    with pytest.raises(Refused, match=f"of 500 bytes, but {size:,} are documented"):
+        get(site, tmp_path, bytes=size)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_rest_of_a_file_of_another_size_is_refused(tmp_path, site):
+    site.offers["a.zip"] = Offer(BIG[:1000], of=9999)
+    part_of(site, tmp_path, BIG[:500])
+    with pytest.raises(Refused, match="of 9,999 bytes, but 1,000 are documented"):
+        get(site, tmp_path, bytes=1000)
+
+
+def test_a_shorter_part_than_was_asked_for_is_gone_on_with(tmp_path, site):
+    site.offers["a.zip"] = Offer(BIG[:1500], step=600)
+    part_of(site, tmp_path, BIG[:500])
+    assert get(site, tmp_path).read_bytes() == BIG[:1500]
+    assert [asked for _, asked in site.asked] == ["bytes=500-", "bytes=1100-"]
+
+
+@pytest.mark.parametrize("offer", [{}, {"length": False}, LASTING])
+def test_a_file_of_undocumented_size_leaves_the_reserve_free(tmp_path, site, monkeypatch, offer):
+    site.offers["a.zip"] = Offer(BIG, **offer)
+    free = transfer._RESERVE + PIECE
+    monkeypatch.setattr("shutil.disk_usage", lambda path: shutil._ntuple_diskusage(free, 0, free))
+    told = Told()
+    with pytest.raises(Refused, match="no room for .* more than 262,144 bytes") as refused:
+        get(site, tmp_path, meter=told)
+    assert told.count == (0 if offer == {} else PIECE)
+    assert f"remove {tmp_path / 'a.zip.part'}" in str(refused.value)
+    if offer != LASTING:
+        monkeypatch.undo()
+        monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+        assert get(site, tmp_path).read_bytes() == BIG
+
+
+@pytest.mark.parametrize("documented", [True, False])
+def test_a_packed_answer_is_refused_and_not_unpacked(tmp_path, site, documented):
+    packed = gzip.compress(bytes(2**20), mtime=0)
+    site.offers["a.zip"] = Offer(packed, packed="gzip")
+    with pytest.raises(Refused, match=r"sends it packed \(gzip\) though it was asked not to"):
+        get(site, tmp_path, bytes=len(packed) if documented else None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_answer_that_says_it_is_not_packed_comes(tmp_path, site):
+    site.offers["a.zip"] = Offer(BIG, packed="identity")
+    assert get(site, tmp_path).read_bytes() == BIG
+
+
+@pytest.mark.parametrize("address", [True, False])
+def test_a_file_that_is_there_is_held_against_the_documented_size(tmp_path, site, address):
+    (tmp_path / "a.zip").write_bytes(b"half")
+    with pytest.raises(Refused, match=r"a\.zip is of 4 bytes, but 8 are documented; remove it"):
+        get(site, tmp_path, bytes=8, **({} if address else {"url": None}))
+    assert (tmp_path / "a.zip").read_bytes() == b"half"
+
+
 def test_a_broken_connection_is_gone_on_with_at_once(tmp_path, site):
     site.offers["a.zip"] = Offer(BIG, breaks_after=[PIECE, PIECE])
     told = Told()
@@ -543,9 +650,7 @@ def test_a_part_of_another_address_is_thrown_away(tmp_path, site):
 def test_a_part_that_is_complete_or_too_long_does_no_harm(tmp_path, site):
     site.offers["a.zip"] = Offer(BIG)
     for part in (BIG, BIG + b"more"):
-        (tmp_path / "a.zip.part").write_bytes(part)
-        note = {"url": site.url("a.zip"), "validator": '"one"'}
-        (tmp_path / "a.zip.part.json").write_text(json.dumps(note))
+        part_of(site, tmp_path, part)
         assert get(site, tmp_path).read_bytes() == BIG
         (tmp_path / "a.zip").unlink()
 
@@ -695,6 +800,12 @@ def linked_zip() -> bytes:
     return out.getvalue()
 
 
+def nul_tar() -> bytes:
+    info = tarfile.TarInfo("a.bvh")
+    info.pax_headers = {"path": "a\0.bvh"}
+    return tarred(info)
+
+
 def encrypted_zip() -> bytes:
     content = bytearray(zipped({"a.bvh": b"a"}))
     content[6] |= 1  # the flag, in the local header and in the directory
@@ -729,6 +840,13 @@ def test_a_tar_of_a_folder_begins_with_the_folder(tmp_path):
         ("a.zip", zipped({"good.bvh": b"", "/tmp/a.bvh": b"x"}), "an absolute path"),
         ("a.zip", zipped({"good.bvh": b"", "..\\a.bvh": b"x"}), "a path out of its folder"),
         ("a.zip", zipped({"good.bvh": b"", "C:\\a.bvh": b"x"}), "an absolute path"),
+        ("a.zip", zipped({"a": b"", "a/b.bvh": b"x"}), "its member 'a/b.bvh' is under 'a', which is a file"),
+        ("a.zip", zipped({"a/b/c.bvh": b"", "a": b"x"}), "its member 'a/b/c.bvh' is under 'a'"),
+        ("a.zip", zipped({"good.bvh": b"", ".fetch/s/b.zip": b"x"}), "'.fetch/s/b.zip' is in .fetch, where"),
+        ("a.zip", zipped({"good.bvh": b"", "./.fetch": b"x"}), "'.fetch' is in .fetch, where downloads lie"),
+        ("a.tar.gz", tarred(("a", b"1"), ("a/b.bvh", b"x")), "its member 'a/b.bvh' is under 'a'"),
+        ("a.tar.gz", tarred(("good.bvh", b""), (".fetch/s/b", b"x")), "where downloads lie"),
+        ("a.tar.gz", nul_tar(), "'a\\x00.bvh' is no name of a file"),
         ("a.zip", linked_zip(), "a link or a device"),
         ("a.zip", encrypted_zip(), "encrypted"),
         ("a.tar.gz", tarred(("good.bvh", b""), ("../a.bvh", b"x")), "a path out of its folder"),
@@ -796,6 +914,32 @@ def test_a_link_that_is_there_already_is_not_followed_out(tmp_path):
     with pytest.raises(Refused, match="through a link"):
         unpacked(tmp_path, "a.zip", zipped({"b/a.bvh": b"x"}))
     assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+def test_a_name_that_the_disk_does_not_take_is_told(tmp_path):
+    name = "x" * 300 + ".bvh"
+    with pytest.raises(Refused, match=rf"a\.zip: its member '{name}' cannot .*: File name too long"):
+        unpacked(tmp_path, "a.zip", zipped({name: b"x"}))
+    assert list((tmp_path / "in/here").iterdir()) == []
+
+
+@pytest.mark.parametrize(("there", "name"), [("a", "a/b/c.bvh"), ("a/b.bvh/c", "a/b.bvh")])
+def test_what_is_in_the_way_is_told(tmp_path, there, name):
+    place = tmp_path / "in/here" / there
+    place.parent.mkdir(parents=True)
+    place.write_bytes(b"old")
+    with pytest.raises(Refused, match=rf"a\.zip: its member '{name}' cannot be written .*in the way"):
+        unpacked(tmp_path, "a.zip", zipped({name: b"x"}))
+    assert [path for path in (tmp_path / "in/here").rglob("*") if path.is_file()] == [place]
+
+
+def test_a_set_does_not_unpack_into_its_downloads(tmp_path, site, motionary):
+    file = registry(tmp_path, site, {"a.zip": zipped({".fetch/small/b.bvh": b"b"}), "b.zip": zipped({})})
+    folder = tmp_path / "set"
+    code, _, err = motionary("fetch", "small", folder, "--accept-licence", "--registry", file)
+    assert code == 1
+    assert "'.fetch/small/b.bvh' is in .fetch, where downloads lie" in err
+    assert not (folder / ".fetch/small/b.bvh").exists()
 
 
 def test_no_room_to_unpack_is_told(tmp_path, monkeypatch):

@@ -18,11 +18,9 @@ from filelock import FileLock, Timeout
 from motionary.pipeline.readers.amc import find_skeleton, skeletons_in
 from motionary.workflows.fetch.labels import NAME, clips_among, labelled_clips, write_labels
 from motionary.workflows.fetch.meter import Meter
-from motionary.workflows.fetch.registry import OWN_FILES, FetchError, PublicSet
+from motionary.workflows.fetch.registry import DOWNLOADS, OWN_FILES, FetchError, PublicSet
 from motionary.workflows.fetch.transfer import download
 from motionary.workflows.fetch.unpack import ARCHIVES, unpack
-
-DOWNLOADS = ".fetch"
 
 
 @dataclass(frozen=True)

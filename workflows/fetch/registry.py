@@ -21,6 +21,8 @@ LABELS = ("action", "style", "subject", "take")
 """What the name of a clip may tell; always columns of the labels file, empty where it does not."""
 OWN_FILES = ("labels.csv", "SOURCE.txt")
 """What is written beside the files of a set."""
+DOWNLOADS = ".fetch"
+"""The hidden folder, in that of a set, where what is downloaded lies."""
 
 
 class FetchError(UserError):

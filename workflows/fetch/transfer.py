@@ -6,6 +6,10 @@ asks for the rest with `Range` (RFC 9110, 14.2). A part may be continued only by
 `If-Range` (13.1.5) has the server send all of it where its entity tag or date is another by now; where a
 server has given neither, a published digest must make sure of it, or the part is begun anew. So it is with a
 server that knows no ranges, which sends everything.
+
+What a server says is not trusted: of a documented size no more is written than that, and a file of another is
+refused; of an undocumented one no more than the disk has room for, less a reserve. A body that the server has
+packed though it was asked not to (Content-Encoding, 8.4) is refused too: a small one may unpack to any size.
 """
 
 from __future__ import annotations
@@ -14,10 +18,11 @@ import errno
 import json
 import os
 import re
+import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pooch
 import requests
@@ -31,6 +36,7 @@ TIMEOUT = (10.0, 60.0)
 # Seconds between attempts, and how often one that got further is followed by another.
 _PAUSE, _ATTEMPTS = 1.0, 10
 _CHUNK = 2**14  # what a broken connection can cost
+_RESERVE = 2**28  # bytes that a file of undocumented size leaves free on the disk
 _BROKEN = (requests.ConnectionError, requests.exceptions.ChunkedEncodingError)
 _MISSING, _BEYOND, _PARTIAL = 404, 416, 206  # HTTP
 
@@ -67,7 +73,10 @@ def download(file: SetFile, folder: Path, source: str, meter: Meter) -> Path:
             raise FetchError(f"the address of {file.name} is not documented; {by_hand.removeprefix('or ')}")
         if file.digest and not _has_digest(place, *file.digest.split(":")):
             raise FetchError(f"{place} has not the published digest {file.digest}; {by_hand}")
+        _refuse_other_size(file, place)
         return place
+    if file.digest is None and place.exists():  # pooch would take it as it is
+        _refuse_other_size(file, place)
     if place.exists() and file.digest and not _has_digest(place, *file.digest.split(":")):
         by_hand += (
             f"; what is there now, {place.stat().st_size:,} bytes, has not the published digest {file.digest}"
@@ -146,27 +155,62 @@ class Resuming:
         with requests.get(url, headers=headers, stream=True, timeout=TIMEOUT) as answer:
             if have and answer.status_code == _BEYOND:
                 if answer.headers.get("Content-Range") == f"bytes */{have}":
-                    return
+                    return self._check_size(url, have)
                 self.part.unlink()
                 return self._receive(url)
             answer.raise_for_status()
+            _refuse_packed(answer, url)
             have = have if _continues(answer, have) else 0
             total = _total(answer, have)
-            if self.file.bytes is not None and total not in (None, self.file.bytes):
-                self.part.unlink(missing_ok=True)
-                raise FetchError(
-                    f"{url} is of {total:,} bytes, but {self.file.bytes:,} are documented: it was changed, "
-                    "or the server answers with something else; look at it in a browser"
-                )
+            most = self._most()
+            if total is not None:
+                self._check_size(url, total)
+                if total > most:
+                    self._refuse_beyond(url, most)
             self.note.write_text(json.dumps({"url": url, "validator": _validator(answer)}))
             self.meter.begin(self.file.name, total or self.file.bytes, have)
+            come = have
             with self.part.open("ab" if have else "wb") as part:
                 for chunk in answer.iter_content(_CHUNK):
+                    come += len(chunk)
+                    if come > most:
+                        break
                     part.write(chunk)
                     self.meter.advance(len(chunk))
+        if come > most:
+            self._refuse_beyond(url, most)
         wanted = self.file.bytes or total
-        if wanted is not None and self._size() < wanted:
-            raise requests.ConnectionError(f"closed after {self._size():,} of {wanted:,} bytes")
+        tells_its_end = total is None and answer.headers.get("Transfer-Encoding") == "chunked"
+        if wanted is not None and come < wanted and not tells_its_end:
+            raise requests.ConnectionError(f"closed after {come:,} of {wanted:,} bytes")
+        self._check_size(url, come)
+
+    def _most(self) -> int:
+        """Return how many bytes the file may have: the documented size, or what the disk has room for."""
+        room = self._size() + shutil.disk_usage(self.folder).free - _RESERVE
+        return self.file.bytes or max(room, 0)
+
+    def _refuse_beyond(self, url: str, most: int) -> NoReturn:
+        if self.file.bytes is not None:
+            self._refuse_size(url, f"more than {most:,}")
+        raise FetchError(
+            f"no room for {url}: its size is not documented, it is of more than {most:,} bytes, and then "
+            f"less than {_RESERVE:,} would be free in {self.folder}; make room and run this again to go on "
+            f"with it, or remove {self.part} if it cannot be that large"
+        )
+
+    def _check_size(self, url: str, size: int) -> None:
+        if self.file.bytes not in (None, size):
+            self._refuse_size(url, f"{size:,}")
+
+    def _refuse_size(self, url: str, size: str) -> NoReturn:
+        """Refuse a file of another size than is documented, and what came of it."""
+        self.part.unlink(missing_ok=True)
+        self.note.unlink(missing_ok=True)
+        raise FetchError(
+            f"{url} is of {size} bytes, but {self.file.bytes:,} are documented: it was changed, "
+            "or the server answers with something else; look at it in a browser"
+        )
 
     def _resumable(self, url: str) -> tuple[int, str | None]:
         """Return how much of this very file is there, and what tells that it is of it."""
@@ -186,6 +230,23 @@ def _has_digest(place: Path, algorithm: str, digits: str) -> bool:
     return bool(pooch.file_hash(str(place), algorithm) == digits)
 
 
+def _refuse_other_size(file: SetFile, place: Path) -> None:
+    size = place.stat().st_size
+    if file.bytes not in (None, size):
+        raise FetchError(
+            f"{place} is of {size:,} bytes, but {file.bytes:,} are documented; remove it and run this again"
+        )
+
+
+def _refuse_packed(answer: requests.Response, url: str) -> None:
+    packed = answer.headers.get("Content-Encoding", "identity")
+    if packed.strip().lower() not in ("", "identity"):
+        raise FetchError(
+            f"{url}: the server sends it packed ({packed}) though it was asked not to, so that its size "
+            "cannot be known; get it in a browser"
+        )
+
+
 def _continues(answer: requests.Response, have: int) -> bool:
     starts = re.match(r"bytes (\d+)-", answer.headers.get("Content-Range", ""))
     if answer.status_code == _PARTIAL and not (starts and int(starts[1]) == have):
@@ -194,6 +255,9 @@ def _continues(answer: requests.Response, have: int) -> bool:
 
 
 def _total(answer: requests.Response, have: int) -> int | None:
+    of = re.fullmatch(r"bytes \d+-\d+/(\d+)", answer.headers.get("Content-Range", ""))
+    if answer.status_code == _PARTIAL and of:  # less may come than was asked for
+        return int(of[1])
     length = answer.headers.get("Content-Length", "")
     return have + int(length) if length.isdigit() else None
 

@@ -1,9 +1,10 @@
 """Zips and tars from the web, unpacked such that they can do no harm.
 
 All members are looked at before anything is written. An archive is refused whole, by the name of the member,
-where one would leave the folder (`..`, an absolute path, a drive) or is a link or a device, or where the
-members are together more than a hundred times the archive. Python's own ways are milder: `tarfile`'s filter
-"data" lets links inside the folder pass, and `zipfile` renames what it does not like.
+where one would leave the folder (`..`, an absolute path, a drive), or lie among the downloads or under a
+file, or is a link or a device, or where the members are together more than a hundred times the archive.
+Python's own ways are milder: `tarfile`'s filter "data" lets links inside the folder pass, and `zipfile`
+renames what it does not like.
 """
 
 from __future__ import annotations
@@ -17,18 +18,28 @@ import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from motionary.workflows.fetch.registry import FetchError
+from motionary.workflows.fetch.registry import DOWNLOADS, FetchError
 
 ARCHIVES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
 _LARGEST_RATIO, _ALLOWANCE = 100, 2**20  # of small archives headers alone may be more
 _MOST_MEMBERS = 10**6
 _DAMAGED = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, NotImplementedError)
+_IN_THE_WAY = "remove what is in the way (a file for a folder, or the reverse)"
+_MENDS = {
+    errno.ENOSPC: "make room",
+    errno.EDQUOT: "make room",
+    errno.ENAMETOOLONG: "name a folder whose disk takes such names",
+    errno.EEXIST: _IN_THE_WAY,
+    errno.ENOTDIR: _IN_THE_WAY,
+    errno.EISDIR: _IN_THE_WAY,
+    errno.ENOTEMPTY: _IN_THE_WAY,
+}
 
 
 @dataclass(frozen=True)
@@ -76,6 +87,7 @@ def unpack(
             with _damage_told(archive):
                 members = opened.enter_context(_members(archive))
                 wanted += [one for one in _safe(members, archive) if keeps(one.name)]
+        _refuse_clashes(wanted)
         _refuse_without_room(sum(one.size for one in wanted), folder)
         with show_progress({"unpack": len(wanted)}) as done:
             for one in wanted:
@@ -138,7 +150,7 @@ def _safe(members: Iterator[_Member], archive: Path) -> list[_Member]:
     files = []
     room = archive.stat().st_size * _LARGEST_RATIO + _ALLOWANCE
     for count, one in enumerate(members, 1):
-        reason = one.odd or _leaves(one.name)
+        reason = one.odd or _misplaced(one.name)
         room -= one.size
         if reason:
             raise FetchError(
@@ -154,12 +166,28 @@ def _safe(members: Iterator[_Member], archive: Path) -> list[_Member]:
     return files
 
 
-def _leaves(name: str) -> str | None:
-    """Say why a path would leave its folder; a backslash parts names too, as it does on Windows."""
+def _misplaced(name: str) -> str | None:
+    """Say why nothing may go to a path; a backslash parts names too, as it does on Windows."""
     path = PurePosixPath(name.replace("\\", "/"))
     if path.is_absolute() or re.match("[A-Za-z]:", name):
         return "an absolute path"
-    return "a path out of its folder" if ".." in path.parts else None
+    if ".." in path.parts:
+        return "a path out of its folder"
+    if "\0" in name:
+        return "no name of a file"
+    return f"in {DOWNLOADS}, where downloads lie" if path.parts[:1] == (DOWNLOADS,) else None
+
+
+def _refuse_clashes(wanted: list[_Member]) -> None:
+    """Refuse a file under a file."""
+    files = {PurePosixPath(one.name) for one in wanted}
+    for one in wanted:
+        for above in PurePosixPath(one.name).parents:
+            if above in files:
+                raise FetchError(
+                    f"{one.archive} is not unpacked: its member {one.name!r} is under {str(above)!r}, which "
+                    "is a file of the set too; nothing was written"
+                )
 
 
 def _refuse_without_room(needed: int, folder: Path) -> None:
@@ -184,9 +212,11 @@ def _write(one: _Member, folder: Path) -> None:
     except OSError as error:
         if error.errno is None:
             raise
-        mend = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "let this user write there"
+        mend = _MENDS.get(error.errno, "let this user write there")
         raise FetchError(
-            f"{place} cannot be written: {error.strerror or error}; {mend} and run this again"
+            f"{one.archive}: its member {one.name!r} cannot be written into {folder}: "
+            f"{error.strerror or error}; {mend} and run this again"
         ) from None
     finally:
-        begun.unlink(missing_ok=True)
+        with suppress(OSError):  # where it could not be begun, it cannot be removed
+            begun.unlink(missing_ok=True)
