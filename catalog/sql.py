@@ -32,6 +32,8 @@ TAKES = "takes"
 
 Parameters = Sequence[object] | Mapping[str, object]
 
+_ONLY_READ = "a catalog is only read: give one statement that selects"
+
 _JOINED = {TAKES: ("clips", "clusters")}
 
 
@@ -74,10 +76,14 @@ class SqlSession:
         with self._asking(self._snapshot) as cursor:
             statements = cursor.extract_statements(query)
             if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
-                raise CatalogError("a catalog is only read: give one statement that selects")
+                raise CatalogError(_ONLY_READ)
             self._make_views(_named_in(query))
-            # DuckDB takes `with x as (copy ... to ...)` for a selection, but not within another.
-            cursor.execute(f"explain from (\n{statements[0].query.rstrip().removesuffix(';')}\n)", parameters)
+            query = statements[0].query.rstrip().removesuffix(";")
+            cursor.execute(f"explain {query}", parameters)  # which tells what is wrong with it
+            try:  # DuckDB takes `with x as (copy ... to ...)` for a selection, but not within another
+                cursor.execute(f"explain from (\n{query}\n)", parameters)
+            except duckdb.Error:
+                raise CatalogError(_ONLY_READ) from None
             return cursor.sql(query, params=parameters).to_arrow_table()
 
     def over(
@@ -109,7 +115,8 @@ class SqlSession:
         except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
             wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
             damage = None if isinstance(error, wrong) else damaged_file(self._store, snapshot, PUBLISHED)
-            raise CatalogError(damage or f"the query cannot be answered: {error}") from error
+            why = " ".join(str(error).partition("\n\nLINE ")[0].split())
+            raise CatalogError(damage or f"the query cannot be answered: {why}") from error
 
     def _make_views(self, names: set[str]) -> None:
         tables = {one for name in names for one in _JOINED.get(name, (name,))}

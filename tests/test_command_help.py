@@ -1,8 +1,11 @@
 """Every command's help ends with examples that it understands, and every command speaks JSON."""
 
 import json
+import os
 import re
 import shlex
+import subprocess
+import sys
 
 import pytest
 import typer
@@ -108,6 +111,12 @@ def test_what_is_printed_is_json(arguments, demo_catalog, demo_library, tmp_path
     assert answer or arguments[:2] == ("label", "list")
 
 
-def test_a_shell_can_complete(motionary):
-    code, script, _ = motionary("--show-completion", "bash")
-    assert "_MOTIONARY_COMPLETE" in script
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("motionary sim", "similar"), ("motionary run --label-p", "--label-pattern")]
+)
+def test_a_shell_can_complete(typed, offered):
+    words = typed.split()
+    asked = {"_MOTIONARY_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(len(words) - 1)}
+    program = [sys.executable, "-c", "from motionary.workflows.cli import main; main()"]
+    told = subprocess.run(program, env=os.environ | asked, capture_output=True, text=True, check=False)
+    assert offered in told.stdout.split(), told.stderr

@@ -3,9 +3,12 @@
 import csv
 import io
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -202,14 +205,107 @@ def test_a_fault_inside_a_worker_is_one_line(demo_library, tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog):
+@pytest.mark.parametrize(
+    ("sql", "format_", "reader", "lines"),
+    [
+        ("select * from frames", "csv", "head -2", 2),
+        ("select * from frames", "json", "head -2", 2),
+        ("select * from range(100000)", "table", "head -2", 2),
+        ("select 1", "csv", "true", 0),  # so short an answer is sent when all is done
+        ("select 1", "table", "true", 0),
+    ],
+)
+def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog, sql, format_, reader, lines):
     command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' query {demo_catalog}"
     shown = subprocess.run(
-        f"{command} 'select * from frames' --format csv | head -2",
-        shell=True, capture_output=True, text=True, check=True,
+        ["bash", "-c", f"{command} '{sql}' --format {format_} | {reader}; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONUNBUFFERED": ""},
     )  # fmt: skip
-    assert len(shown.stdout.splitlines()) == 2
+    assert len(shown.stdout.splitlines()) == lines
     assert shown.stderr == ""
+    assert shown.returncode == 128 + signal.SIGPIPE
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("format_", ["csv", "table"])
+def test_an_answer_that_finds_no_room_is_a_failure(demo_catalog, format_):
+    command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' query {demo_catalog}"
+    shown = subprocess.run(
+        f"{command} 'select 1' --format {format_} > /dev/full",
+        shell=True, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (shown.returncode, shown.stderr.count("\n")) == (1, 1)
+    assert "no space left on device; make room there" in shown.stderr
+
+
+INTERVAL = "interval '1 year -2 days 03:04:05.000006'"
+ODD = {
+    INTERVAL: "12 months -2 days 11045.000006 seconds",
+    "interval 0 days": "0 seconds",
+    f"[{INTERVAL}]": ["12 months -2 days 11045.000006 seconds"],
+    "union_value(num := 2)": 2,
+    "[union_value(word := 'a')]": ["a"],
+    "struct_pack()": {},
+    "map {}": [],
+    "['nan'::double]": [None],
+    "null::interval": None,
+}
+"""What not every format has a type for, and what JSON says of it."""
+
+
+@pytest.mark.parametrize("value", ODD)
+def test_what_a_format_cannot_hold_is_text(motionary, demo_catalog, value):
+    sql, expected = f"select {value} as odd", ODD[value]
+    assert json.loads(motionary("query", demo_catalog, sql, "--format", "json")[1]) == [{"odd": expected}]
+    _, out, _ = motionary("query", demo_catalog, f"{sql}, 1 as row", "--format", "csv")
+    (row,) = csv.DictReader(io.StringIO(out))
+    assert row["odd"] == (expected or "" if isinstance(expected, str | None) else json.dumps(expected))
+    code, out, err = motionary("query", demo_catalog, sql, "--format", "parquet", binary=True)
+    assert (code, err) == (0, "")
+    (held,) = pq.read_table(io.BytesIO(out))["odd"].to_pylist()
+    if "nan" not in value:
+        assert held == (json.dumps(expected) if isinstance(expected, int | list | dict) else expected)
+    assert motionary("query", demo_catalog, sql)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("'10101'::bit", r"\x03\xF5"),
+        (r"'\xAA\x00=\x5C\x27a'::blob", r"\xAA\x00=\x5C\x27a"),
+        ("'a'::blob", "a"),
+    ],
+)
+def test_bytes_are_text_that_gives_them_back(motionary, demo_catalog, value, text):
+    _, out, _ = motionary("query", demo_catalog, f"select {value} as bytes", "--format", "csv")
+    assert out.splitlines() == ['"bytes"', f'"{text}"']
+    _, out, _ = motionary("query", demo_catalog, f"select {value} as bytes", "--format", "json")
+    assert json.loads(out) == [{"bytes": text}]
+    same = f"select {value}::blob = '{text}'::blob as same" if "bit" not in value else "select true as same"
+    assert json.loads(motionary("query", demo_catalog, same, "--format", "json")[1]) == [{"same": True}]
+
+
+def test_an_interval_as_text_gives_it_back(motionary, demo_catalog):
+    sql = f"select {INTERVAL} = '{ODD[INTERVAL]}'::interval as same"
+    assert json.loads(motionary("query", demo_catalog, sql, "--format", "json")[1]) == [{"same": True}]
+
+
+@pytest.mark.parametrize("format_", ["json", "parquet"])
+def test_columns_of_one_name_are_not_lost(motionary, demo_catalog, format_):
+    code, out, err = motionary("query", demo_catalog, "select 1 as a, 2 as b, 3 as b", "--format", format_)
+    assert (code, out) == (1, "")
+    assert "motionary: 2 columns are called 'b'" in err
+    _, out, _ = motionary("query", demo_catalog, "select 1 as a, 2 as b, 3 as b", "--format", "csv")
+    assert out.splitlines() == ['"a","b","b"', "1,2,3"]
+
+
+@pytest.mark.parametrize("format_", ["json", "table"])
+@pytest.mark.parametrize("value", ["'infinity'::timestamp", "[date '20000-01-01']"])
+def test_a_date_that_python_does_not_have_is_told_by_its_column(motionary, demo_catalog, value, format_):
+    code, out, err = motionary("query", demo_catalog, f"select 1 as a, {value} as far", "--format", format_)
+    assert (code, out) == (1, "")
+    assert "motionary: column 'far' holds a value that cannot be written" in err
+    assert '"far"::varchar' in err
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from motionary.workflows.csv_cells import csv_plain, csv_safe
 from motionary.workflows.tables import write_table
 
-STARTS = "=+-@\t\r"
-TRICKY = st.text(st.one_of(st.sampled_from("'=+-@\t\r\n\"a"), st.characters()))
+STARTS = "=+-@＝＋－＠\t\r\n"
+TRICKY = st.text(st.one_of(st.sampled_from("'=+-@＝＠\t\r\n\"a"), st.characters()))
 
 
 @given(TRICKY)
@@ -26,7 +26,7 @@ def test_reading_undoes_writing_for_every_text(text):
     assert not csv_safe(text).startswith(tuple(STARTS))
 
 
-@pytest.mark.parametrize("text", ["walk", "", "it's", "'quoted'", "1-2", " =1", "é"])
+@pytest.mark.parametrize("text", ["walk", "", "it's", "'quoted'", "1-2", " =1", "é", "a\n=1", "全＝1"])
 def test_other_text_stays_as_it_is(text):
     assert csv_safe(text) == csv_plain(text) == text
 

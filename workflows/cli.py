@@ -26,15 +26,19 @@ from motionary.workflows.commands import (
     snapshots,
     take_out,
 )
-from motionary.workflows.commands.options import FAILED, examples, fail
+from motionary.workflows.commands.options import examples, fail
 from motionary.workflows.errors import UserError
+
+CLOSED_PIPE = 128 + 13
+"""Exit code where nobody reads on: what a shell shows of the tools that SIGPIPE, signal 13, has ended."""
 
 app = typer.Typer(
     name="motionary",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips, 4 verification failed.",
+    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with quarantined clips, 4 verification failed, "
+    "141 nobody read the answer to its end (as in `| head -1`).",
 )
 
 
@@ -65,10 +69,10 @@ app.add_typer(label.label, name="label")
 def main() -> NoReturn:
     """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
     try:
-        app(prog_name="motionary")
+        _answer()
     except BrokenPipeError:  # the reader has seen enough; nothing more may be written, at exit neither
         sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115
-        sys.exit(FAILED)
+        sys.exit(CLOSED_PIPE)
     except UserError as error:
         fail(str(error))
     except OSError as error:
@@ -85,6 +89,17 @@ def main() -> NoReturn:
             raise
         fail(str(error))
     sys.exit(0)
+
+
+def _answer() -> None:
+    """Run the command, to the last byte of its answer; Typer and Rich would exit with 1 at a closed pipe."""
+    try:
+        app(prog_name="motionary")
+    except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):
+            raise ended.__context__ from None
+        print(end="", flush=True)  # while what this raises can still be told
+        raise
 
 
 _MENDS = {

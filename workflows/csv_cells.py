@@ -1,15 +1,16 @@
 """Text in a CSV that a spreadsheet shows and does not run.
 
-A spreadsheet takes a cell that begins with = + - or @ for a formula, also after a tab or a carriage return.
-Such text gets an apostrophe in front, which spreadsheets take for "this is text". Text that has the
-apostrophe already gets one more, so that taking one away always gives back what was there.
+A spreadsheet takes a cell that begins with = + - or @ for a formula, also in the full width of East Asian
+scripts, and also after a tab or the end of a line. Such text gets an apostrophe in front, which spreadsheets
+take for "this is text". Text that has the apostrophe already gets one more, so that taking one away always
+gives back what was there.
 """
 
 from __future__ import annotations
 
 import re
 
-UNSAFE = "^('*[=+\\-@\t\r])"
+UNSAFE = "^('*[=+\\-@＝＋－＠\t\r\n])"
 """Text that begins like a formula, behind any number of apostrophes; for `re` and for Arrow alike."""
 
 _UNSAFE = re.compile(UNSAFE)

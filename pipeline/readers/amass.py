@@ -23,14 +23,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.motion import FloatArray, Motion, Skeleton
-from motionary.pipeline.readers.arrays import read_arrays
+from motionary.pipeline.readers.arrays import Declared, declared_arrays, read_arrays
 from motionary.pipeline.readers.errors import ReadError
 from motionary.pipeline.readers.extent import check_extent
 from motionary.pipeline.readers.text import LARGEST
 
 _MODELS = {72: ("SMPL", 24), 156: ("SMPL-H", 52), 165: ("SMPL-X", 55)}
 _RATES = ("mocap_framerate", "mocap_frame_rate")
+_SMALL = 1 << 16  # bytes of the arrays that hold one value
+_BLOCK = 1 << 11  # frames turned at a time: what is needed on the way is small beside the take
 _STATURE = 1.70
+
+_UPRIGHT = Rotation.from_euler("X", -90, degrees=True)  # Z up becomes Y up
 
 # Joint, parent, offset in shares of stature; SMPL's rest pose is a T, Y up, facing +Z, its left at +X.
 _TRUNK = 0.30 / 4
@@ -76,32 +80,28 @@ def read_amass(path: Path) -> Motion:
         The file is no NPZ, lacks an array or holds one that cannot be: of another shape, not of numbers, of
         Python objects, too large.
     """
-    arrays = read_arrays(path, ("poses", "trans"), (*_RATES, "gender"))
-    poses, trans = _numbers(path, "poses", arrays), _numbers(path, "trans", arrays)
-    if poses.ndim != 2 or poses.shape[1] not in _MODELS:
-        known = ", ".join(f"{width} ({name})" for width, (name, _) in _MODELS.items())
-        what = f"'poses' has shape {poses.shape}; a row has one of {known} values"
-        raise ReadError(path, None, what, "give AMASS's own file, with the poses of all joints")
-    if trans.shape != (len(poses), 3):
-        what = f"'trans' has shape {trans.shape} and 'poses' {len(poses)} rows"
-        raise ReadError(path, None, what, "both have a row a frame: copy the file again")
-    fps = _rate(path, arrays)
-    check_extent(path, len(poses), fps)
-    model, joints = _MODELS[poses.shape[1]]
-    turn = Rotation.from_euler("X", -90, degrees=True)
-    turns = Rotation.from_rotvec(poses[:, : 3 * len(_ORDER)].reshape(-1, 3))
-    rotations = turns.as_quat().reshape(len(poses), len(_ORDER), 4)
-    rotations[:, 0] = (turn * Rotation.from_quat(rotations[:, 0])).as_quat()
+    declared = declared_arrays(path, ("poses", "trans"))
+    frames, width = _size(path, declared)
+    about = read_arrays(path, (), (*_RATES, "gender"), largest=_SMALL)
+    fps = _rate(path, about)
+    check_extent(path, frames, fps)
+    arrays = read_arrays(path, tuple(declared))
+    model, joints = _MODELS[width]
+    root_position, rotations = np.empty((frames, 3)), np.empty((frames, len(_ORDER), 4))
+    for first in range(0, frames, _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        rotations[rows] = _turned(_numbers(path, "poses", arrays["poses"][rows]))
+        root_position[rows] = _UPRIGHT.apply(_numbers(path, "trans", arrays["trans"][rows]))
     return Motion(
         name=path.stem,
         skeleton=mean_body(),
         fps=fps,
-        root_position=turn.apply(trans),
+        root_position=root_position,
         rotations=rotations,
         unit=1.0,
         source=str(path),
         notes=(
-            f"{model} pose{_gender(arrays)}: {len(_ORDER)} of {joints} joints kept, without hands and face",
+            f"{model} pose{_gender(about)}: {len(_ORDER)} of {joints} joints kept, without hands and face",
             f"a mean body of {_STATURE:.2f} m, from proportions: the file holds none",
             "world turned by -90 degrees about X: AMASS is Z-up",
         ),
@@ -120,8 +120,28 @@ def mean_body() -> Skeleton:
     return Skeleton(tuple(_ORDER), parents, _STATURE * np.array([bones[name][1] for name in _ORDER]))
 
 
-def _numbers(path: Path, name: str, arrays: dict[str, np.ndarray]) -> FloatArray:
-    values = arrays[name]
+def _size(path: Path, declared: dict[str, Declared]) -> tuple[int, int]:
+    """Return how many frames, and values a pose, the file declares."""
+    poses, trans = declared["poses"].shape, declared["trans"].shape
+    if len(poses) != 2 or poses[1] not in _MODELS:
+        known = ", ".join(f"{width} ({name})" for width, (name, _) in _MODELS.items())
+        what = f"'poses' has shape {poses}; a row has one of {known} values"
+        raise ReadError(path, None, what, "give AMASS's own file, with the poses of all joints")
+    if trans != (poses[0], 3):
+        what = f"'trans' has shape {trans} and 'poses' {poses[0]} rows"
+        raise ReadError(path, None, what, "both have a row a frame: copy the file again")
+    return poses[0], poses[1]
+
+
+def _turned(poses: FloatArray) -> FloatArray:
+    """Return poses (frames x values) as quaternions (frames x 22 x 4) in a world that is Y up."""
+    turns = Rotation.from_rotvec(poses[:, : 3 * len(_ORDER)].reshape(-1, 3))
+    rotations = turns.as_quat().reshape(len(poses), len(_ORDER), 4)
+    rotations[:, 0] = (_UPRIGHT * Rotation.from_quat(rotations[:, 0])).as_quat()
+    return rotations
+
+
+def _numbers(path: Path, name: str, values: np.ndarray) -> FloatArray:
     usable = values.dtype.kind in "fiu"
     values = values.astype(np.float64) if usable else values
     if not (usable and (np.abs(values) <= LARGEST).all()):  # false for what is not a number
@@ -135,7 +155,7 @@ def _rate(path: Path, arrays: dict[str, np.ndarray]) -> float:
     if rate is None:
         mend = "AMASS's files of a body's shape are no motion; of another file, add the rate"
         raise ReadError(path, None, f"the file has neither {_RATES[0]!r} nor {_RATES[1]!r}", mend)
-    values = _numbers(path, rate, arrays)
+    values = _numbers(path, rate, arrays[rate])
     if values.size != 1:
         raise ReadError(path, None, f"{rate!r} has shape {values.shape}", "it is one number")
     return float(values.item())

@@ -112,6 +112,14 @@ def stamp_of(archive: Path, name: str) -> bytes:
     return repr(said).encode("utf-8", "backslashreplace")
 
 
+def packing_fault(info: zipfile.ZipInfo) -> str:
+    """Say to how much a member unpacks, where that is more than a clip can be; else nothing."""
+    packed_well = info.file_size > LARGE_MEMBER and info.file_size > MOST_PACKED * info.compress_size
+    if info.file_size <= LARGEST_MEMBER and not packed_well:
+        return ""
+    return f"it unpacks from {info.compress_size / 1e6:.3g} MB to {info.file_size / 1e6:.0f} MB"
+
+
 @contextmanager
 def as_files(path: Path, skeleton: Path | None) -> Iterator[tuple[Path, Path | None]]:
     """Give paths that can be opened: themselves, or, of members of a zip, unpacked copies that go afterwards.
@@ -194,9 +202,7 @@ def _judged(info: zipfile.ZipInfo) -> Member:
         return Member(raw, info, "it is encrypted", "unpack the archive, or pack it without a password")
     if stat.S_ISLNK(info.external_attr >> 16):
         return Member(raw, info, "it is a link", "pack the file itself")
-    packed_well = info.file_size > LARGE_MEMBER and info.file_size > MOST_PACKED * info.compress_size
-    if info.file_size > LARGEST_MEMBER or packed_well:
-        what = f"it unpacks from {info.compress_size / 1e6:.3g} MB to {info.file_size / 1e6:.0f} MB"
+    if what := packing_fault(info):
         return Member(raw, info, what, "no take is like that; if this is one, unpack the archive")
     return Member(raw, info)
 

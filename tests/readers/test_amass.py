@@ -2,6 +2,7 @@
 
 import io
 import struct
+import tracemalloc
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -14,7 +15,7 @@ from motionary.pipeline.canonical import find_convention
 from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.features import frame_features
 from motionary.pipeline.readers import ReadError, read_motion, scan_library
-from motionary.pipeline.readers.amass import mean_body
+from motionary.pipeline.readers.amass import mean_body, read_amass
 from motionary.pipeline.readers.arrays import LARGEST_ARRAY
 
 UPRIGHT = Rotation.from_euler("X", 90, degrees=True).as_rotvec()  # a body that stands in a Z-up world
@@ -128,17 +129,17 @@ def test_a_pickled_gender_is_passed_over(write_npz) -> None:
     assert motion.notes[0].startswith("SMPL-H pose: 22 of 52")
 
 
-def npy(shape: tuple[int, ...], content: bytes = b"") -> bytes:
+def npy(shape: tuple[int, ...], content: bytes = b"", kind: str = "<f8") -> bytes:
     """Return an array file whose header may lie."""
-    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
+    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + content
 
 
 @pytest.mark.parametrize(
     ("poses", "what"),
     [
-        (npy((10**12, 156)), "declares 1248000000000000 MB|declares 1248000000 MB"),
-        (npy((2**62, 2**62)), "declares .* MB, more than"),
+        (npy((10**12, 156)), r"declares 1\.25e\+09 MB of numbers, more than"),
+        (npy((2**62, 2**62)), "declares .* MB of numbers, more than"),
         (npy((10, 156), bytes(100)), "declares 12480 bytes and holds 100"),
         (npy((-1, 156)), "declares|no whole NPZ"),
         (npy((10, 156))[:20], "no whole NPZ"),
@@ -159,18 +160,80 @@ def test_a_header_that_lies_is_not_believed(tmp_path: Path, poses: bytes, what: 
         read_motion(path)
 
 
-def test_zeros_that_unpack_to_more_than_is_read_are_refused(tmp_path: Path) -> None:
-    path, rows = tmp_path / "bomb.npz", LARGEST_ARRAY // (8 * 156) + 1
-    many, more = divmod(rows, 1 << 12)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr("trans.npy", b"")
-        with archive.open("poses.npy", "w") as file:
-            file.write(npy((rows, 156)))
-            for count in [1 << 12] * many + [more]:
-                file.write(bytes(count * 8 * 156))
-    assert path.stat().st_size < LARGEST_ARRAY / 100
-    with pytest.raises(ReadError, match="declares 537 MB, more than the 537 MB read"):
+@pytest.mark.parametrize("rows", [LARGEST_ARRAY // (8 * 72) + 1, 1 << 40])
+@pytest.mark.parametrize("kind", ["<f8", "|i1"])
+def test_an_array_is_measured_by_what_its_numbers_take(tmp_path: Path, rows: int, kind: str) -> None:
+    path = tmp_path / "large.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("poses.npy", npy((rows, 72), kind=kind))
+        archive.writestr("trans.npy", npy((rows, 3), kind=kind))
+    with pytest.raises(ReadError, match=r"'poses' declares .* MB of numbers, more than the 537 MB read"):
         read_motion(path)
+
+
+def test_zeros_that_unpack_to_much_more_than_a_take_are_refused_unread(tmp_path: Path, monkeypatch) -> None:
+    path, rows = tmp_path / "bomb.npz", 1 << 18
+    arrays = {"poses": np.zeros((rows, 72), np.int8), "trans": np.zeros((rows, 3)), "mocap_framerate": 1e4}
+    np.savez_compressed(path, **arrays)
+    assert path.stat().st_size < 1 << 16
+    monkeypatch.setattr(zipfile.ZipFile, "open", None)  # the archive's directory tells enough
+    with pytest.raises(ReadError, match=r"'poses': it unpacks from 0\.\d+ MB to 19 MB"):
+        read_motion(path)
+    monkeypatch.undo()
+    np.savez(path, **arrays)
+    assert read_motion(path).frames == rows
+
+
+def test_too_long_a_take_is_refused_by_its_headers(write_npz, monkeypatch) -> None:
+    path = write_npz(**without(poses=np.zeros((7300, 156)), trans=np.zeros((7300, 3)), mocap_framerate=0.5))
+    read, sizes = np.lib.format.read_array, []
+
+    def counted(file, **options) -> np.ndarray:
+        array = read(file, **options)
+        sizes.append(array.size)
+        return array
+
+    monkeypatch.setattr(np.lib.format, "read_array", counted)
+    with pytest.raises(ReadError, match="4.06 hours"):
+        read_motion(path)
+    assert set(sizes) == {1}  # the rate and the gender
+
+
+def test_what_is_read_of_a_header_does_not_grow_with_what_it_declares(tmp_path: Path) -> None:
+    path, length = tmp_path / "header.npz", 1 << 24  # a header of spaces
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1, 72), }".ljust(length)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("poses.npy", b"\x93NUMPY\x02\x00" + struct.pack("<I", length) + header + bytes(576))
+        archive.writestr("trans.npy", npy((1, 3), bytes(24)))
+    del header
+    tracemalloc.start()
+    try:
+        with pytest.raises(ReadError, match="no whole NPZ .*header"):
+            read_motion(path)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 22
+    finally:
+        tracemalloc.stop()
+
+
+def test_the_way_to_a_motion_takes_little_more_memory_than_file_and_motion(tmp_path: Path) -> None:
+    path, frames = tmp_path / "take.npz", 1 << 14
+    poses, trans = np.ones((frames, 165), np.int8), np.zeros((frames, 3), np.int8)
+    np.savez(path, poses=poses, trans=trans, mocap_framerate=120.0)
+    tracemalloc.start()
+    try:
+        motion = read_amass(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    needed = poses.nbytes + trans.nbytes + motion.rotations.nbytes + motion.root_position.nbytes
+    assert peak < 2.25 * needed, (
+        peak / needed
+    )  # a motion is checked in a copy; float64 of all poses takes more
+
+
+def test_a_long_gender_is_not_read(write_npz) -> None:
+    with pytest.raises(ReadError, match=r"'gender' declares 0\.\d+ MB of numbers, more than the 0\.0655 MB"):
+        read_motion(write_npz(**without(gender=np.full(1 << 16, "x"))))
 
 
 def test_any_damage_is_a_read_error(write_npz) -> None:

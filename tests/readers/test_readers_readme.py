@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from motionary.pipeline import readers
 from motionary.pipeline.canonical import CANONICAL_JOINTS, CONVENTIONS, Convention
 from motionary.pipeline.readers import FORMATS
 from motionary.pipeline.readers.markers import MARKER_SETS, terms_of
 
-FOLDER = Path(readers.__file__).parent
+FOLDER = Path(__file__).resolve().parents[2] / "pipeline" / "readers"
 TEXT = (FOLDER / "README.md").read_text()
 
 
