@@ -6,6 +6,7 @@ import json
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import pyarrow as pa
@@ -89,6 +90,10 @@ class Catalog:
     quarantine = _Table()
     runs = _Table()
 
+    _kept: dict[str, Any]
+    _keeping: AbstractContextManager[Any]
+    _process: int
+
     def __init__(self, store: Store, snapshot: Snapshot, lease: Lease | None = None) -> None:
         self.store = store
         self.snapshot = snapshot
@@ -141,7 +146,7 @@ class Catalog:
             return self._kept[key]
 
     def _start_keeping(self) -> None:
-        self._kept: dict[str, Any] = {}
+        self._kept = {}
         self._keeping, self._process = threading.RLock(), os.getpid()
 
     def snapshots(self) -> list[str]:
