@@ -65,7 +65,7 @@ def data_card(plan: ExportPlan, clips: Sequence[Mapping], failed: Mapping[str, s
     dict
         What `card.json` holds.
     """
-    run = plan.catalog.runs.to_arrow().slice(len(plan.catalog.runs) - 1).to_pylist()[0]
+    run = plan.catalog.last_run
     parts = list(plan.split.shares) if plan.split else []
     unlicensed = [clip for clip in clips if not clip.get("licence")]
     return {

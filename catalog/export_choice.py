@@ -40,8 +40,7 @@ def chosen_clips(
     if not known:
         raise CatalogError(f"{catalog.store.url} holds no clips: there is nothing to export")
     if clips is not None:
-        for clip_id in sorted(set(clips) - set(known)):
-            raise CatalogError(f"no clip {clip_id!r} in {catalog.store.url}{nearest(clip_id, known)}")
+        catalog.require(*sorted(set(clips)))
     if cluster is not None:
         wanted = pa.array(_cluster_ids(catalog, str(cluster)), pa.int32())
         members = members.filter(pc.is_in(members["cluster_id"], wanted))

@@ -29,7 +29,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from motionary.catalog.errors import CatalogError, nearest
 from motionary.catalog.example import Example, LibraryFeatures, example_of, library_features
 from motionary.catalog.joint_columns import JointColumns, joint_columns
 from motionary.catalog.places import rows_by_clip
@@ -148,12 +147,8 @@ def _places(
     """Find the takes to look in."""
     if takes is None:
         return [place for place, clip_id in enumerate(library.clip_ids) if clip_id != example.clip_id]
+    catalog.require(*takes)
     place_of = {clip_id: place for place, clip_id in enumerate(library.clip_ids)}
-    for clip_id in takes:
-        if clip_id not in place_of:
-            raise CatalogError(
-                f"no clip {clip_id!r} in {catalog.store.url}{nearest(clip_id, library.clip_ids)}"
-            )
     return [place_of[clip_id] for clip_id in takes]
 
 

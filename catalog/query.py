@@ -162,7 +162,12 @@ class Catalog:
     @property
     def settings(self) -> dict[str, Any]:
         """The settings of the run that made the snapshot, by stage."""
-        return json.loads(self.runs.to_arrow()["settings"][-1].as_py())
+        return json.loads(self.last_run["settings"])
+
+    @property
+    def last_run(self) -> dict[str, Any]:
+        """The row of `runs` of the run that made the snapshot."""
+        return self.keep("last run", lambda: self.runs.to_arrow()[-1:].to_pylist()[0])
 
     @property
     def config(self) -> PipelineConfig:

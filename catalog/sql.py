@@ -79,10 +79,10 @@ class SqlSession:
                 raise CatalogError(_ONLY_READ)
             self._make_views(_named_in(query))
             query = statements[0].query.rstrip().removesuffix(";")
-            cursor.execute(f"explain {query}", parameters)  # which tells what is wrong with it
             try:  # DuckDB takes `with x as (copy ... to ...)` for a selection, but not within another
                 cursor.execute(f"explain from (\n{query}\n)", parameters)
             except duckdb.Error:
+                cursor.execute(f"explain {query}", parameters)  # what is wrong with it, if anything is
                 raise CatalogError(_ONLY_READ) from None
             return cursor.sql(query, params=parameters).to_arrow_table()
 

@@ -28,7 +28,7 @@ from motionary.workflows.reproduce.better import (
 from motionary.workflows.reproduce.combinations import StudiedDistance, pairs_among
 from motionary.workflows.reproduce.draws import PAPER_SIZES, RULES, WHOLE, draw
 from motionary.workflows.reproduce.dtw_curve import Experiment, study_dtw_curve
-from motionary.workflows.reproduce.labelled import feature_config, labelled_clips
+from motionary.workflows.reproduce.labelled import labelled_clips
 from motionary.workflows.reproduce.report import report
 from motionary.workflows.reproduce.scores import MEASURES, score_set
 from motionary.workflows.reproduce.silhouette import silhouette_cut
@@ -282,12 +282,12 @@ def test_too_few_clips_a_class_are_refused(monkeypatch):
 
 def test_features_are_made_as_the_catalogs_run_made_them(demo_catalog):
     catalog = Catalog.open(demo_catalog)
-    assert feature_config(catalog) == FeatureConfig()
+    assert catalog.config.features == FeatureConfig()
     clips = labelled_clips(catalog, "action")
     assert clips.clip_ids == sorted(clips.clip_ids)
     resampled = catalog.resampled.to_pandas()
     first = clips.clip_ids[0]
     kept = np.array(resampled[resampled.clip_id == first].sort_values("frame").feature.tolist())
     np.testing.assert_allclose(
-        motion_features(catalog.motion(first), feature_config(catalog)), kept, atol=1e-5
+        motion_features(catalog.motion(first), catalog.config.features), kept, atol=1e-5
     )

@@ -1,6 +1,7 @@
 """Clips chosen by what is known of them, read as tables and as streams of motions."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -10,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from motionary.catalog import Catalog, CatalogError
+from motionary.catalog.description import _counts
 from motionary.catalog.views.notebook import facts_html, table_html
 from motionary.pipeline.config import PipelineConfig
 
@@ -98,12 +100,14 @@ def test_motions_stream_as_they_are_one_by_one(catalog, aligned):
     assert sorted(streamed) == chosen.clip_ids
     table = catalog.aligned_frames if aligned else catalog.frames
     rows = table.to_pandas()
+    rated, column = (catalog.alignments, "frame_rate") if aligned else (catalog.clips, "fps")
+    rate_of = rated.to_pandas().set_index("clip_id")[column]
     for clip_id, motion in streamed.items():
         own = rows[rows["clip_id"] == clip_id].sort_values("frame")
         np.testing.assert_array_equal(motion.root_position, np.stack(own["root_position"]))
         alone = catalog.aligned(clip_id) if aligned else catalog.motion(clip_id)
         np.testing.assert_array_equal(motion.rotations, alone.rotations)
-        assert motion.fps == alone.fps
+        assert motion.fps == alone.fps == rate_of[clip_id]
 
 
 @pytest.mark.parametrize(("merged", "table"), [(False, "features"), (True, "resampled")])
@@ -179,6 +183,12 @@ def test_the_description_counts(catalog):
     assert sum(found.formats.values()) == sum(found.conventions.values()) == 80
     assert found.seconds == pytest.approx(catalog.clips.to_pandas()["seconds"].sum())
     assert "80, " in repr(found)
+
+
+def test_counts_begin_with_the_most_frequent_and_go_on_by_name(catalog):
+    found = replace(catalog.describe(), names=_counts(pa.chunked_array([["b", None, "c", "a", "c"]])))
+    assert [*found.names.items()] == [("c", 2), ("a", 1), ("b", 1)]
+    assert "c 2, a 1, b 1" in repr(found)
 
 
 def test_a_notebook_shows_what_a_table_holds(catalog):

@@ -97,7 +97,7 @@ class RunReport:
         """Take down what a catalog holds: quarantine, clusters and the run's own record."""
         self.quarantined = rows(catalog.quarantine.to_arrow())
         self.clusters = rows(cluster_table(catalog))
-        run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+        run = catalog.last_run
         self.run_id = run["run_id"]
         self.stage_seconds = dict(run["stage_seconds"])
 

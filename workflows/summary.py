@@ -19,7 +19,7 @@ _MOST_CLUSTERS = 40
 
 def print_summary(catalog: Catalog, console: Console) -> None:
     """Print a catalog's clips, clusters, scores, times and place."""
-    run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+    run = catalog.last_run
     clips, clusters = counted(run["clips"], "clip"), counted(run["clusters"], "cluster")
     console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
     parts: list[RenderableType] = []
@@ -33,7 +33,7 @@ def print_summary(catalog: Catalog, console: Console) -> None:
 
 def summary_record(catalog: Catalog) -> dict[str, Any]:
     """Say as plain values what `print_summary` prints."""
-    run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+    run = catalog.last_run
     return {
         "catalog": catalog.store.url,
         "snapshot": catalog.snapshot.snapshot_id,

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from motionary.catalog.adapters.clip_parts import ClipParts
 from motionary.catalog.errors import CatalogError
+from motionary.catalog.export_choice import rows_of
 from motionary.catalog.selection import Selection
 from motionary.pipeline.canonical import canonical_indices, find_convention
 from motionary.pipeline.features import frame_features, sample_times
@@ -158,9 +159,7 @@ def _check(representation: str, frame_rate: float | None) -> None:
 
 def _clips(selection: Selection) -> pa.Table:
     """Read the rows of `clips`, in the selection's order."""
-    clips = selection.catalog.clips.to_arrow().select(_CLIP)
-    places = pc.index_in(pa.array(selection.clip_ids, pa.string()), clips["clip_id"].combine_chunks())
-    return clips.take(places).combine_chunks()
+    return rows_of(selection.catalog.clips.to_arrow().select(_CLIP), selection.clip_ids).combine_chunks()
 
 
 def _stored(selection: Selection, clips: pa.Table, aligned: bool) -> list[tuple[int, float]]:

@@ -89,7 +89,7 @@ def merged_frames_cover_every_frame(catalog: Catalog) -> Found:
 
 def the_run_counted_them(catalog: Catalog) -> Found:
     """Every count of the last run's record, of clips, quarantine and clusters, is that of the tables."""
-    run = catalog.runs.to_arrow().to_pylist()[-1]
+    run = catalog.last_run
     counts = catalog.sql(
         """select (select count(distinct clip_id) from clips) as clips,
                   (select count(distinct path) from quarantine) as quarantined,

@@ -48,7 +48,7 @@ def overview_page(catalog: Catalog) -> str:
 
 
 def _top(catalog: Catalog, name: str) -> str:
-    run = catalog.runs.to_arrow().slice(len(catalog.runs) - 1).to_pylist()[0]
+    run = catalog.last_run
     sources = catalog.clusters.to_arrow()["label_source"].to_pylist()
     figures = facts(
         [

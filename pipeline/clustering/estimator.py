@@ -22,12 +22,7 @@ from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, check_non_negative, validate_data
 
 from motionary.pipeline.clustering.choice import choose_cut
-from motionary.pipeline.clustering.linkage import (
-    average_linkage,
-    complete_linkage,
-    fuzzy_linkage,
-    ward_linkage,
-)
+from motionary.pipeline.clustering.linkage import LINKAGES, fuzzy_linkage
 from motionary.pipeline.config import ClusterConfig, LinkageMethod, Metric
 from motionary.pipeline.distances.dtw_pairs import pairwise_dtw
 from motionary.pipeline.distances.nearest import nearest_clips, pack_library
@@ -35,7 +30,6 @@ from motionary.pipeline.distances.pairwise import pairwise_distances
 from motionary.pipeline.distances.tiles import comparable_clips
 from motionary.pipeline.motion import FloatArray
 
-_LINKAGES = {"complete": complete_linkage, "ward": ward_linkage, "average": average_linkage}
 Motions = Sequence[ArrayLike] | NDArray[Any]
 
 _METRICS = (*get_args(Metric), "precomputed")
@@ -116,7 +110,7 @@ class MotionClusterer(ClusterMixin, BaseEstimator):
         if self.linkage == "fuzzy":
             self.linkage_matrix_ = fuzzy_linkage(low, high, config.fuzzy_tau)
         else:
-            self.linkage_matrix_ = _LINKAGES[self.linkage](low)
+            self.linkage_matrix_ = LINKAGES[self.linkage](low)
         self.cut_ = choose_cut(self.linkage_matrix_, low + config.fuzzy_tau * (high - low), config)
         self.labels_, self.n_clusters_ = self.cut_.labels, self.cut_.n_clusters
         return self

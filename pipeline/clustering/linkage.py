@@ -89,6 +89,10 @@ def ward_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
     return merges
 
 
+LINKAGES = {"complete": complete_linkage, "ward": ward_linkage, "average": average_linkage}
+"""Those that read one distance a pair."""
+
+
 def fuzzy_linkage(low: ArrayLike, high: ArrayLike, tau: float = 0.5) -> NDArray[np.float64]:
     """Merge by interval distances: equation 11 of [DC 5].
 

@@ -9,16 +9,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from motionary.pipeline.clustering import (
-    Cut,
-    average_linkage,
-    choose_cut,
-    complete_linkage,
-    cut_tree,
-    fuzzy_linkage,
-    labels_suffice,
-    ward_linkage,
-)
+from motionary.pipeline.clustering import Cut, choose_cut, cut_tree, fuzzy_linkage, labels_suffice
+from motionary.pipeline.clustering.linkage import LINKAGES
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.evaluation import adjusted_rand_index, best_reward_punish, reward_punish
 from motionary.pipeline.stages.columns import condensed, condensed_places
@@ -27,7 +19,6 @@ from motionary.pipeline.tables import LABEL_COLUMNS, TABLES
 VERSION = 2
 MAKES = ("clips", "linkage", "partitions", "cuts", "groups")
 
-_LINKAGES = {"complete": complete_linkage, "ward": ward_linkage, "average": average_linkage}
 _METRICS = ("dtw", "b_dtw", "weighted")
 
 
@@ -138,8 +129,8 @@ def _dendrograms(clip_ids: pa.ChunkedArray, pairs: pa.Table, config: ClusterConf
     for metric in _METRICS:
         distances = condensed(pairs, metric, place)
         for method in dict.fromkeys(("complete", "ward", config.primary)):
-            if method in _LINKAGES:
-                made.append(_dendrogram(method, metric, distances, _LINKAGES[method](distances), config))
+            if method in LINKAGES:
+                made.append(_dendrogram(method, metric, distances, LINKAGES[method](distances), config))
     low, high = (condensed(pairs, name, place) for name in ("fuzzy_low", "fuzzy_high"))
     key = low + config.fuzzy_tau * (high - low)
     made.append(_dendrogram("fuzzy", "fuzzy", key, fuzzy_linkage(low, high, tau=config.fuzzy_tau), config))

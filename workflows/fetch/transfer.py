@@ -71,13 +71,13 @@ def download(file: SetFile, folder: Path, source: str, meter: Meter) -> Path:
     if file.url is None:
         if not place.exists():
             raise FetchError(f"the address of {file.name} is not documented; {by_hand.removeprefix('or ')}")
-        if file.digest and not _has_digest(place, *file.digest.split(":")):
+        if _has_other_digest(file, place):
             raise FetchError(f"{place} has not the published digest {file.digest}; {by_hand}")
         _refuse_other_size(file, place)
         return place
     if file.digest is None and place.exists():  # pooch would take it as it is
         _refuse_other_size(file, place)
-    if place.exists() and file.digest and not _has_digest(place, *file.digest.split(":")):
+    if place.exists() and _has_other_digest(file, place):
         by_hand += (
             f"; what is there now, {place.stat().st_size:,} bytes, has not the published digest {file.digest}"
         )
@@ -226,8 +226,11 @@ class Resuming:
         return self.part.stat().st_size if self.part.exists() else 0
 
 
-def _has_digest(place: Path, algorithm: str, digits: str) -> bool:
-    return bool(pooch.file_hash(str(place), algorithm) == digits)
+def _has_other_digest(file: SetFile, place: Path) -> bool:
+    if file.digest is None:
+        return False
+    algorithm, digits = file.digest.split(":")
+    return bool(pooch.file_hash(str(place), algorithm) != digits)
 
 
 def _refuse_other_size(file: SetFile, place: Path) -> None:

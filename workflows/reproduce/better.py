@@ -33,7 +33,7 @@ from motionary.pipeline.resample import merge_low_motion
 from motionary.workflows.reproduce.combinations import LINKAGES, Condensed, StudiedDistance
 from motionary.workflows.reproduce.draws import RULES, WHOLE
 from motionary.workflows.reproduce.dtw_curve import Experiment, Show, drawable_clips, notes, stages
-from motionary.workflows.reproduce.labelled import feature_config, read_features
+from motionary.workflows.reproduce.labelled import read_features
 from motionary.workflows.reproduce.report import spread
 from motionary.workflows.reproduce.study import Combination, Study, run_study
 from motionary.workflows.tables import text_table
@@ -48,7 +48,7 @@ CHOSEN = Combination("velocity 0.05", "weighted", "ward")
 def study_better(catalog: Catalog, label_column: str, draws: int, seed: int, show: Show) -> Experiment:
     """Study the changes on a labelled catalog; arguments and errors are those of `study_dtw_curve`."""
     clips = drawable_clips(catalog, label_column)
-    config = replace(feature_config(catalog), kind="pose+travel")
+    config = replace(catalog.config.features, kind="pose+travel")
     features_of = {
         f"velocity {tau:g}": partial(features_with_velocity, config=config, tau=tau) for tau in VELOCITY_TIMES
     }

@@ -36,7 +36,7 @@ from motionary.workflows.reproduce.cotw_measures import (
 )
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.joint_angles import joint_angles
-from motionary.workflows.reproduce.labelled import feature_config, labelled_clips
+from motionary.workflows.reproduce.labelled import labelled_clips
 from motionary.workflows.reproduce.pairs import MOST_ACTIONS, Action, draw_actions
 
 POSITIONS, ANGLES = "joint positions", "root and joint angles"
@@ -75,7 +75,7 @@ def study_cotw(catalog: Catalog, label_column: str, draws: int, seed: int, show:
     paired = sorted({clip_id for action in actions for _, pair in action for clip_id in pair})
     takes = known_takes(synthetic_library())
     positions = _read_positions(catalog, {*paired, *(one for action in actions for one in action.members)})
-    rate = feature_config(catalog).frame_rate
+    rate = catalog.config.features.frame_rate
     pairs = sum(len(list(action)) for action in actions)
     stages = {"read": len(paired), "align": 2 * pairs, "known warps": len(takes), "references": len(actions)}
     with show(stages) as advance:

@@ -25,7 +25,6 @@ from motionary.workflows.reproduce.draws import LEAST, MOST_CLASSES, RULES, draw
 from motionary.workflows.reproduce.labelled import (
     FeatureOf,
     LabelledClips,
-    feature_config,
     labelled_clips,
     read_features,
 )
@@ -67,7 +66,7 @@ def study_dtw_curve(catalog: Catalog, label_column: str, draws: int, seed: int, 
         The catalog has no such labels, or too few classes of enough clips to draw from.
     """
     clips = drawable_clips(catalog, label_column)
-    config = feature_config(catalog)
+    config = catalog.config.features
     features_of: dict[str, FeatureOf] = {
         kind: partial(motion_features, config=replace(config, kind=kind)) for kind in KINDS
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.catalog import Catalog
-from motionary.pipeline.canonical import Convention
-from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.tables import TABLES
 from motionary.workflows.errors import UserError
@@ -76,14 +73,6 @@ def labelled_clips(catalog: Catalog, label_column: str) -> LabelledClips:
         clips[label_column].to_numpy(object),
         subjects.to_numpy(object) if known else None,
     )
-
-
-def feature_config(catalog: Catalog) -> FeatureConfig:
-    """Return how the catalog's last run made its features: its merging, rate and joint-name conventions."""
-    runs = catalog.runs.to_arrow()
-    fields = json.loads(runs["settings"][len(runs) - 1].as_py())["features"]
-    conventions = tuple(Convention(one["name"], one["joints"]) for one in fields["conventions"])
-    return FeatureConfig(**{**fields, "conventions": conventions})
 
 
 def read_features(
