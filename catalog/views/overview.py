@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from motionary.catalog.query import Catalog
+from motionary.catalog.views.charts import chart_html, plotly_script
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.colours import cluster_character, cluster_colour
 from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES, dendrogram_figure
@@ -43,7 +44,7 @@ def overview_page(catalog: Catalog) -> str:
             _scores(catalog),
             _quarantine(catalog),
         ],
-        head=_plotly_script() if any(charts) else "",
+        head=plotly_script() if any(charts) else "",
     )
 
 
@@ -126,7 +127,7 @@ def _dendrogram(catalog: Catalog, figure: go.Figure | None) -> str:
         "Dendrogram",
         "Which clips and clusters merge at which height; what lies left of the dashed line is published."
         + hidden,
-        _chart(figure, "dendrogram"),
+        chart_html(figure, "dendrogram"),
     )
 
 
@@ -137,7 +138,7 @@ def _mu_kappa(figure: go.Figure | None) -> str:
         "Clusters by threshold",
         "How many clusters κ the threshold μ leaves, for each distance. A long level stretch is a number of "
         "clusters that many thresholds agree on; the longest between one cluster and single clips is marked.",
-        _chart(figure, "mu-kappa"),
+        chart_html(figure, "mu-kappa"),
     )
 
 
@@ -170,20 +171,3 @@ def _quarantine(catalog: Catalog) -> str:
 def _mark(cluster_id: int) -> Html:
     colour = cluster_colour(cluster_id)
     return Html(f'<span style="color:{colour}" aria-hidden="true">{cluster_character(cluster_id)}</span>')
-
-
-def _plotly_script() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return f"<script>{get_plotlyjs()}</script>"
-
-
-def _chart(figure: go.Figure, name: str) -> str:
-    return figure.to_html(
-        full_html=False,
-        include_plotlyjs=False,
-        include_mathjax=False,
-        div_id=name,
-        # Without the button that would upload the chart, and the names of its clips, to a server.
-        config={"displaylogo": False, "responsive": True, "showSendToCloud": False},
-    )

@@ -6,35 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-STYLE = """
-:root { color-scheme: light dark; --ground: #ffffff; --ink: #1c1c1e; --quiet: #66666b; --line: #d9d9de;
-  --shade: #f4f4f6; }
-@media (prefers-color-scheme: dark) {
-  :root { --ground: #17181a; --ink: #e9e9ec; --quiet: #a0a0a8; --line: #3a3b40; --shade: #212226; } }
-body { background: var(--ground); color: var(--ink); font: 15px/1.5 system-ui, sans-serif;
-  max-width: 1100px; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
-h1 { font-size: 1.6rem; margin: 0 0 .25rem; overflow-wrap: anywhere; }
-h2 { font-size: 1.15rem; margin: 2.5rem 0 .25rem; }
-p { margin: .25rem 0 .75rem; max-width: 46rem; }
-.quiet { color: var(--quiet); }
-.after { margin-top: 1rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; }
-th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line);
-  vertical-align: top; }
-th { color: var(--quiet); font-weight: 600; }
-.number { text-align: right; font-variant-numeric: tabular-nums; }
-.facts { display: flex; flex-wrap: wrap; gap: .5rem 2.5rem; margin: 1rem 0 0; padding: 0; }
-.facts div { display: flex; flex-direction: column-reverse; }
-.facts dt { color: var(--quiet); font-size: .85rem; }
-.facts dd { margin: 0; font-size: 1.5rem; font-variant-numeric: tabular-nums; }
-details { border-bottom: 1px solid var(--line); padding: .3rem 0; }
-summary { cursor: pointer; }
-details .wide { padding: .4rem 0 .8rem 1.2rem; }
-code { background: var(--shade); padding: .1rem .35rem; border-radius: 4px; overflow-wrap: anywhere; }
-:is(.cartesianlayer, .infolayer) text { fill: var(--ink) !important; }
-"""
-
+from motionary.catalog.views.assets import asset
 
 @dataclass(frozen=True)
 class Html:
@@ -61,7 +33,7 @@ def page(title: str, body: Sequence[str], head: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n{head}\n</head>\n<body>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{asset('style.css')}</style>\n{head}\n</head>\n<body>\n"
         + "\n".join(body)
         + "\n</body>\n</html>\n"
     )

@@ -1,0 +1,1 @@
+"""The web application that `motionary browse` serves: pages over one catalog."""
