@@ -8,6 +8,7 @@ from html import escape
 
 from motionary.catalog.views.assets import asset
 
+
 @dataclass(frozen=True)
 class Html:
     """Text that is HTML already; whoever makes one has escaped what is in it."""
