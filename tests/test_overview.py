@@ -20,17 +20,14 @@ from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES, dendrogram_figur
 from motionary.catalog.views.linkages import linkages_by_distance, primary_linkage
 from motionary.catalog.views.mu_kappa import mu_kappa_figure, steps
 from motionary.catalog.views.overview import overview_page
-from motionary.catalog.views.skeleton import drawn, moving_skeleton
 from motionary.pipeline.clustering import cut_tree
 from motionary.pipeline.config import AlignmentConfig, ClusterConfig
-from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.stages.align import align
 from motionary.pipeline.stages.cluster import cluster
 from motionary.pipeline.stages.identify import identify
 from motionary.pipeline.stages.name import name as name_them
 from motionary.pipeline.stages.represent import represent
 from motionary.pipeline.stages.style import style
-from motionary.pipeline.synthetic import template
 
 NASTY = '<script>alert("x")</script>&<b>'
 NO_LABELS = pa.table({"clip_id": pa.array([], pa.string())})
@@ -150,9 +147,9 @@ def test_page_escapes_every_name(tmp_path, demo, some_ids):
     assert not {"i", "u", "b", "s"} & set(page.elements)
     assert page.elements.count("script") == Page(overview_page(demo)).elements.count("script")
     assert all(text in page.text for text in (NASTY + "1", "<i>one</i>", "<u>a</u>", "<u>c</u>", "<s>takes&"))
-    for figure in (dendrogram_figure(catalog), moving_skeleton(catalog.motion(NASTY + "1"))):
-        assert "<script>" not in str(figure.to_dict())
-        assert "<i>" not in str(figure.to_dict())
+    figure = dendrogram_figure(catalog)
+    assert "<script>" not in str(figure.to_dict())
+    assert "<i>" not in str(figure.to_dict())
 
 
 def test_page_is_the_same_again(demo):
@@ -240,65 +237,6 @@ def test_equal_clips_have_a_chart():
     mu, kappa = steps(np.array([[0.0, 1.0, 0.0, 2.0], [2.0, 3.0, 0.0, 3.0]]))
     assert mu.tolist() == [0.0, 1.05]
     assert kappa.tolist() == [1.0, 1.0]
-
-
-def test_skeleton_draws_every_bone_in_its_own_time():
-    motion = template("walk")
-    times = np.linspace(0, motion.seconds, 7)
-    lines = drawn(motion, times)
-    assert lines.shape == (7, 3 * (len(motion.skeleton.names) - 1), 3)
-    lengths = np.linalg.norm(lines[:, 1::3] - lines[:, 0::3], axis=-1)
-    bones = np.linalg.norm(motion.skeleton.offsets[1:], axis=-1)
-    np.testing.assert_allclose(lengths / lengths.sum(), np.tile(bones / bones.sum() / 7, (7, 1)), atol=1e-6)
-    assert np.isnan(lines[:, 2::3]).all()
-    assert np.nanmin(lines[..., 1]) == pytest.approx(0, abs=0.05)
-    held = drawn(motion, np.array([motion.seconds, motion.seconds + 9]))
-    np.testing.assert_array_equal(held[0], held[1])
-
-
-def test_skeleton_moves_and_can_be_scrubbed():
-    walk, jump = template("walk"), template("jump")
-    figure = moving_skeleton(walk, jump, max_frames=20)
-    assert len(figure.frames) == 20
-    assert len(figure.layout.sliders[0].steps) == 20
-    assert [button.label for button in figure.layout.updatemenus[0].buttons] == ["Play", "Pause"]
-    assert not np.array_equal(figure.frames[0].data[0].x, figure.frames[9].data[0].x)
-    assert {one.x.dtype for frame in figure.frames for one in frame.data} == {np.dtype(np.float32)}
-    scene = figure.layout.scene
-    spans = [axis.range[1] - axis.range[0] for axis in (scene.xaxis, scene.yaxis, scene.zaxis)]
-    aspect = [scene.aspectratio.x, scene.aspectratio.y, scene.aspectratio.z]
-    np.testing.assert_allclose(np.divide(aspect, spans), aspect[0] / spans[0])
-    for frame in figure.frames:
-        for one in frame.data:
-            for values, axis in ((one.x, scene.xaxis), (one.y, scene.yaxis), (one.z, scene.zaxis)):
-                assert axis.range[0] <= np.nanmin(values) <= np.nanmax(values) <= axis.range[1]
-
-
-def test_skeleton_is_upright_right_handed_and_faces_the_viewer():
-    """A figure facing +X, its left at -Z, one arm stretched to its left."""
-    turn = [0, np.sqrt(0.5), 0, np.sqrt(0.5)]
-    names = ("hips", "head", "left hand")
-    skeleton = Skeleton(names, (-1, 0, 0), np.array([[0, 0, 0], [0, 2, 0], [1, 0, 0]], float))
-    motion = Motion("m", skeleton, 30, np.zeros((1, 3)), [[turn, [0, 0, 0, 1], [0, 0, 0, 1]]])
-    figure = moving_skeleton(motion)
-    bones = np.stack([figure.data[0].x, figure.data[0].y, figure.data[0].z], axis=1)
-    np.testing.assert_allclose(bones[1] - bones[0], [0, 0, 1], atol=1e-6)
-    # unknown joint names: not turned, so that the left hand stays at world -Z, Plotly's -x
-    np.testing.assert_allclose(bones[4] - bones[3], [-0.5, 0, 0], atol=1e-6)
-    assert len(figure.frames) == 1
-
-    known = template("walk")
-    lines = drawn(known, np.zeros(1))[0]
-    parents = list(known.skeleton.names[1:])
-    left = lines[3 * parents.index(next(n for n in parents if "LeftUpLeg" in n)) + 1]
-    right = lines[3 * parents.index(next(n for n in parents if "RightUpLeg" in n)) + 1]
-    assert left[0] > right[0]
-    assert abs(left[2] - right[2]) < 0.2 * (left[0] - right[0])
-
-
-def test_skeleton_needs_a_motion():
-    with pytest.raises(ValueError, match="no motion is given"):
-        moving_skeleton()
 
 
 def test_charts_show_in_a_notebook(demo):

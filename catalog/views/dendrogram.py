@@ -1,4 +1,4 @@
-"""The dendrogram whose clusters are published: merges, their heights, and the cut.
+"""The dendrogram whose clusters are published: merges, their heights, the cut, and the threshold strips.
 
 Leaves stand one below the other and mu runs to the right, as it does in the mu-kappa chart. The places of
 the merges are worked out here: SciPy's `dendrogram` calls itself for every merge on the way down, and a
@@ -7,8 +7,8 @@ chain of a thousand clips is deeper than Python's stack.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,16 +16,21 @@ from numpy.typing import NDArray
 from scipy.cluster.hierarchy import leaves_list
 
 from motionary.catalog.query import Catalog
+from motionary.catalog.views.chart_text import full_text, short_text
 from motionary.catalog.views.colours import AXIS, CHART, COLOURS, GREY, cluster_colour, cluster_symbol
 from motionary.catalog.views.linkages import KeptLinkage, primary_linkage
+from motionary.catalog.views.threshold_band import band_trace, strip_bars
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 MOST_LEAF_NAMES = 150
-_MOST_CLUSTER_NAMES = 60
+_NAME_PIXELS = 13
 _LEAF_PIXELS = 14
 _TALLEST = 1000
+_BAND_PIXELS = 26
+_MARGIN = {"l": 20, "r": 20, "t": 40, "b": 50}
+_STRIPS = "κ of the strip"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,7 @@ class Tree:
 
 
 def dendrogram_figure(catalog: Catalog) -> go.Figure | None:
-    """Draw the dendrogram of the published clusters and where it is cut.
+    """Draw the dendrogram of the published clusters, where it is cut, and the threshold strips above it.
 
     Parameters
     ----------
@@ -71,12 +76,18 @@ def dendrogram_figure(catalog: Catalog) -> go.Figure | None:
     tree = lay_out(kept.Z, np.array([one["cluster_id"] for one in clusters]))
 
     figure = go.Figure([*_merges(tree), _leaves(tree, clusters), _cluster_names(tree, names)])
+    figure.add_trace(band_trace(strip_bars(kept.Z, _last_mu(tree)), _STRIPS, unit=1.0, yaxis="y2"))
     threshold = kept.cut["published_threshold"]
-    figure.add_vline(
+    line = {"color": GREY, "dash": "dash", "width": 1.5}
+    figure.add_shape(type="line", x0=threshold, x1=threshold, yref="paper", y0=0, y1=1, line=line)
+    figure.add_annotation(
+        text=f"cut at μ = {threshold:.4g}: {len(names)} clusters",
         x=threshold,
-        line={"color": GREY, "dash": "dash", "width": 1.5},
-        annotation={"text": f"cut at μ = {threshold:.4g}: {len(names)} clusters", "yanchor": "bottom"},
-        annotation_position="top",
+        xanchor="right" if threshold > 0.8 * _last_mu(tree) else "left",
+        yref="paper",
+        y=1,
+        yanchor="bottom",
+        showarrow=False,
     )
     _arrange(figure, tree, kept, [one["clip_id"] for one in clusters])
     return figure
@@ -148,26 +159,35 @@ def _leaves(tree: Tree, clusters: list[dict]) -> go.Scatter:
         cliponaxis=False,
         hoverinfo="text",
         hovertext=[
-            f"{escape(one['clip_id'])}<br>cluster {one['cluster_id']}, {escape(one['label'] or 'no label')}"
+            f"{full_text(one['clip_id'])}<br>"
+            f"cluster {one['cluster_id']}, {short_text(one['label'] or 'no label')}"
             for one in clusters
         ],
     )
 
 
 def _cluster_names(tree: Tree, names: dict[int, str | None]) -> go.Scatter:
-    """Write each cluster's number and name where its last merge ends, as long as they do not crowd."""
+    """Write clusters' numbers and names where their last merges end; of those that crowd the largest."""
     import plotly.graph_objects as go
 
-    tops = {one: node for node, one in enumerate(tree.cluster_id.tolist()) if one > 0}
-    if len(tops) > _MOST_CLUSTER_NAMES:
-        tops = {}
+    clips = len(tree.children) + 1
+    sizes = Counter(tree.cluster_id[:clips].tolist())
+    every = {one: node for node, one in enumerate(tree.cluster_id.tolist()) if one > 0}
+    apart = _NAME_PIXELS * clips / (_height(clips) - _BAND_PIXELS - _MARGIN["t"] - _MARGIN["b"])
+    tops: dict[int, int] = {}
+    for one in sorted(every, key=lambda one: (-sizes[one], one)):
+        if all(abs(tree.place[every[one]] - tree.place[node]) >= apart for node in tops.values()):
+            tops[one] = every[one]
     nodes = np.array(list(tops.values()), dtype=np.int64)
     return go.Scatter(
         x=tree.height[nodes],
         y=tree.place[nodes],
         mode="text",
-        text=[f"  {one} {escape(names[one] or 'unnamed')}" for one in tops],
-        textposition="top right",
+        text=[f"  {one} {short_text(names[one] or 'unnamed')}" for one in tops],
+        textposition=[
+            "top left" if high else "top right" for high in tree.height[nodes] > 0.9 * tree.height[-1]
+        ],
+        cliponaxis=False,
         hoverinfo="skip",
     )
 
@@ -175,21 +195,41 @@ def _cluster_names(tree: Tree, names: dict[int, str | None]) -> go.Scatter:
 def _arrange(figure: go.Figure, tree: Tree, kept: KeptLinkage, clip_ids: list[str]) -> None:
     clips = len(clip_ids)
     named = clips <= MOST_LEAF_NAMES
+    height = _height(clips)
+    pixel = 1 / (height - _MARGIN["t"] - _MARGIN["b"])
     title = f"merge height μ ({kept.cut['method']} linkage, {kept.cut['metric']} distance)"
     figure.update_layout(
         **CHART,
         showlegend=False,
-        height=min(_TALLEST, 120 + 8 * clips) if not named else 130 + _LEAF_PIXELS * clips,
-        margin={"l": 20, "r": 20, "t": 40, "b": 50},
+        height=height,
+        margin=_MARGIN,
     )
-    figure.update_xaxes(**AXIS, title=title, range=[0, 1.05 * tree.height[-1] or 1], showline=True)
+    figure.update_xaxes(**AXIS, title=title, range=[0, _last_mu(tree)], showline=True)
     figure.update_yaxes(
         **{**AXIS, "gridcolor": "rgba(0,0,0,0)"},
         range=[clips - 0.3, -1.2],
         showticklabels=named,
         tickvals=tree.place[:clips] if named else [],
-        ticktext=[escape(one) for one in clip_ids] if named else [],
+        ticktext=[short_text(one) for one in clip_ids] if named else [],
         tickfont={"size": 10},
         ticklabelstandoff=8,
         automargin=True,
+        domain=[0, 1 - (_BAND_PIXELS - 4) * pixel],
     )
+    figure.update_layout(
+        yaxis2={
+            "domain": [1 - (_BAND_PIXELS - 8) * pixel, 1],
+            "fixedrange": True,
+            "tickfont": {"size": 10},
+            "automargin": True,
+        }
+    )
+
+
+def _height(clips: int) -> int:
+    named = 130 + _LEAF_PIXELS * clips
+    return _BAND_PIXELS + (named if clips <= MOST_LEAF_NAMES else min(_TALLEST, 120 + 8 * clips))
+
+
+def _last_mu(tree: Tree) -> float:
+    return float(1.05 * tree.height[-1]) or 1.0

@@ -1,4 +1,8 @@
-"""The mu-kappa chart: how many clusters each threshold leaves, for every distance [DC figure 9]."""
+"""The mu-kappa chart: how many clusters each threshold leaves, for every distance [DC figure 9].
+
+Below the curves each distance has a row with its threshold strips, so that their widths can be compared: the
+paper's argument for its distances.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from numpy.typing import NDArray
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.colours import AXIS, CHART, COLOURS, GREY
 from motionary.catalog.views.linkages import linkages_by_distance
+from motionary.catalog.views.threshold_band import band_trace, strip_bars
 from motionary.pipeline.clustering import threshold_strips
 
 if TYPE_CHECKING:
@@ -17,10 +22,13 @@ if TYPE_CHECKING:
 
 _DASHES = ("solid", "dash", "dot", "dashdot")
 _LAST_MU = 1.05
+_ROW_PIXELS = 26
+_CURVE_PIXELS = 370
+_MARGIN = {"l": 60, "r": 20, "t": 20, "b": 50}
 
 
 def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
-    """Draw the number of clusters kappa against the threshold mu, with each distance's widest strip.
+    """Draw the number of clusters kappa against the threshold mu, with each distance's threshold strips.
 
     Distances have different units, so that each one's mu is divided by its greatest merge. kappa is drawn
     on a logarithmic scale, the paper's is linear: the few clusters that matter would lie on the axis.
@@ -45,26 +53,16 @@ def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
         metric, unit = one.cut["metric"], one.Z[-1, 2] or 1.0
         mu, kappa = steps(one.Z)
         figure.add_scatter(
-            x=mu,
-            y=kappa,
+            x=mu.astype(np.float32),
+            y=kappa.astype(np.float32),
             name=f"{metric} ({one.cut['method']})",
             legendgroup=metric,
             mode="lines",
             line={"color": colour, "dash": dash, "width": 2, "shape": "hv"},
             hovertemplate=f"{metric}: %{{y}} clusters from μ = %{{x:.3f}}<extra></extra>",
         )
-        if one.cut["strip_clusters"] is not None:
-            figure.add_scatter(
-                x=[one.cut["strip_low"] / unit, one.cut["strip_high"] / unit],
-                y=[one.cut["strip_clusters"]] * 2,
-                name=f"widest strip: {one.cut['strip_clusters']} clusters",
-                legendgroup=metric,
-                mode="lines+markers",
-                line={"color": colour, "width": 6},
-                marker={"symbol": "line-ns", "size": 14, "line": {"color": colour, "width": 3}},
-                opacity=0.6,
-                hovertemplate=f"{metric}, widest strip: %{{y}} clusters<extra></extra>",
-            )
+        bars = strip_bars(one.Z, _LAST_MU * unit)
+        figure.add_trace(band_trace(bars, metric, unit, colour, yaxis="y2", legendgroup=metric))
     published = len(catalog.references)
     figure.add_scatter(
         x=[0, _LAST_MU],
@@ -74,7 +72,7 @@ def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
         line={"color": GREY, "width": 1},
         hoverinfo="skip",
     )
-    _arrange(figure, len(catalog.clips))
+    _arrange(figure, len(catalog.clips), len(curves))
     return figure
 
 
@@ -99,14 +97,19 @@ def steps(Z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float
     return np.append(mu, _LAST_MU), np.append(kappa, kappa[-1])
 
 
-def _arrange(figure: go.Figure, clips: int) -> None:
+def _arrange(figure: go.Figure, clips: int, rows: int) -> None:
+    band = _ROW_PIXELS * rows
+    share = band / (band + _CURVE_PIXELS)
     figure.update_layout(
         **CHART,
-        height=440,
-        margin={"l": 60, "r": 20, "t": 20, "b": 50},
+        height=band + _CURVE_PIXELS + _MARGIN["t"] + _MARGIN["b"],
+        margin=_MARGIN,
         legend={"tracegroupgap": 10},
+        barmode="overlay",
     )
-    figure.update_xaxes(**AXIS, title="threshold μ / greatest merge", range=[0, _LAST_MU], showline=True)
+    figure.update_xaxes(
+        **AXIS, title="threshold μ / greatest merge", range=[0, _LAST_MU], showline=True, anchor="y2"
+    )
     figure.update_yaxes(
         **AXIS,
         title="clusters κ",
@@ -114,4 +117,8 @@ def _arrange(figure: go.Figure, clips: int) -> None:
         tickvals=[digit * 10**power for power in range(6) for digit in (1, 2, 5)],
         range=[np.log10(0.9), np.log10(1.1 * clips)],
         showline=True,
+        domain=[share + 0.03, 1],
+    )
+    figure.update_layout(
+        yaxis2={"domain": [0, share], "fixedrange": True, "type": "category", "range": [rows - 0.5, -0.5]}
     )

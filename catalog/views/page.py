@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -16,10 +17,14 @@ class Html:
     text: str
 
 
+_BREAKS = re.compile("(?<=[/_])")
+
 Cell = str | int | float | Html | None
 
 
-def page(title: str, body: Sequence[str], head: str = "") -> str:
+def page(
+    title: str, body: Sequence[str], head: str = "", before: Sequence[str] = (), after: Sequence[str] = ()
+) -> str:
     """Put a page together.
 
     Parameters
@@ -27,24 +32,35 @@ def page(title: str, body: Sequence[str], head: str = "") -> str:
     title : str
         Plain text.
     body : sequence of str
-        HTML, from top to bottom.
+        HTML of the page's main part, from top to bottom.
     head : str
         Further HTML for the page's head.
+    before, after : sequence of str
+        HTML that stands before and after the main part, such as a table of contents, and data.
     """
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>\n{asset('style.css')}</style>\n{head}\n</head>\n<body>\n"
-        + "\n".join(body)
+        + "\n".join([*before, '<main id="main">', *body, "</main>", *after])
         + "\n</body>\n</html>\n"
     )
 
 
-def section(title: str, intro: str, *body: str) -> str:
-    """Write a heading, a sentence or two in plain text, and what follows."""
-    return f'<section>\n<h2>{escape(title)}</h2>\n<p class="quiet">{escape(intro)}</p>\n' + "\n".join(
+def section(title: str, intro: str, *body: str, name: str | None = None) -> str:
+    """Write a heading, a sentence or two in plain text, and what follows; a link leads to its `name`."""
+    at = "" if name is None else f' id="{escape(name)}"'
+    return f'<section{at}>\n<h2>{escape(title)}</h2>\n<p class="quiet">{escape(intro)}</p>\n' + "\n".join(
         [*body, "</section>"]
     )
+
+
+def isolated(name: str) -> Html:
+    """Write a name from the data: one that is written from right to left does not turn what is beside it.
+
+    A line may end after its slashes and underscores.
+    """
+    return Html(f"<bdi>{_BREAKS.sub('<wbr>', name)}</bdi>")
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:

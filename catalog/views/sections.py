@@ -1,0 +1,120 @@
+"""Sections that the overview and the report share; each says how a chart is put into its page."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable
+from html import escape
+from typing import TYPE_CHECKING
+
+from motionary.catalog.query import Catalog
+from motionary.catalog.views.colours import cluster_character, cluster_colour
+from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES
+from motionary.catalog.views.page import Cell, Html, facts, isolated, section, table
+from motionary.catalog.views.scores import score_columns, score_note, score_row
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+Show = Callable[["go.Figure", str], str]
+"""Puts a chart into a page: `chart_html`, or what packs it first."""
+
+
+def catalog_name(catalog: Catalog) -> str:
+    """Return what a catalog is called: the last part of its URL."""
+    return posixpath.basename(catalog.store.url.rstrip("/"))
+
+
+def heading(catalog: Catalog) -> str:
+    """Write the catalog's name, what made it, and its figures."""
+    run = catalog.last_run
+    sources = catalog.clusters.to_arrow()["label_source"].to_pylist()
+    figures = facts(
+        [
+            ("clips", run["clips"]),
+            ("clusters", run["clusters"]),
+            ("with a label of their own", sum(one in ("supplied", "override") for one in sources)),
+            ("named by their cluster", sources.count("propagated")),
+            ("unassigned", sources.count("unassigned")),
+            ("quarantined", run["quarantined"]),
+        ]
+    )
+    made = f"Snapshot {catalog.snapshot.snapshot_id} of {run['finished_at']:%Y-%m-%d %H:%M} UTC"
+    library = ", ".join(f"<code>{escape(one)}</code>" for one in run["library"])
+    return (
+        f'<h1><bdi>{escape(catalog_name(catalog))}</bdi></h1>\n<p class="quiet">{made}, by motionary '
+        f"{escape(run['version'])}, from {library}</p>\n{figures}"
+    )
+
+
+def dendrogram_section(catalog: Catalog, figure: go.Figure | None, show: Show) -> str:
+    """Show the dendrogram and its cut."""
+    if figure is None:
+        return section("Dendrogram", "A dendrogram needs two clips.", name="dendrogram")
+    hidden = "" if len(catalog.clips) <= MOST_LEAF_NAMES else " Point at a leaf to read its clip."
+    return section(
+        "Dendrogram",
+        "Which clips and clusters merge at which height; what lies left of the dashed line is published."
+        + hidden,
+        show(figure, "dendrogram-chart"),
+        name="dendrogram",
+    )
+
+
+def threshold_section(figure: go.Figure | None, show: Show) -> str:
+    """Show how many clusters each threshold leaves."""
+    title, name = "Clusters by threshold", "thresholds"
+    if figure is None:
+        return section(title, "The curve needs two clips.", name=name)
+    return section(
+        title,
+        "How many clusters κ the threshold μ leaves, for each distance. A long level stretch is a number of "
+        "clusters that many thresholds agree on; the longest between one cluster and single clips is marked.",
+        show(figure, "thresholds-chart"),
+        name=name,
+    )
+
+
+def scores_section(catalog: Catalog) -> str:
+    """List every dendrogram's cut with its scores; empty without clips."""
+    cuts = catalog.cuts.to_arrow().to_pylist()
+    if not cuts:
+        return ""
+    note = score_note(cuts)
+    return section(
+        "Distances and linkages",
+        f"{note[0].upper()}{note[1:]}.",
+        table(score_columns(cuts), [score_row(cut) for cut in cuts]),
+        name="distances",
+    )
+
+
+def quarantine_section(catalog: Catalog, most: int | None = None) -> str:
+    """List the files that could not be read, `most` of them at most."""
+    rows = catalog.quarantine.to_arrow().to_pylist()
+    if not rows:
+        return section("Quarantine", "Every file could be read.", name="quarantine")
+    cells: list[list[Cell]] = [
+        [isolated(one["path"]), one["line"], one["reason"], one["mend"]] for one in rows[:most]
+    ]
+    return section(
+        "Quarantine",
+        "Files that could not be read; the rest of the library is here without them.",
+        table(["file", "line", "what is wrong", "how to mend it"], cells),
+        left_out(len(rows) - len(cells), "files", "select * from quarantine"),
+        name="quarantine",
+    )
+
+
+def left_out(count: int, what: str, query: str) -> str:
+    """Say how many rows are not shown, and how they are asked for."""
+    if count <= 0:
+        return ""
+    asked = f'motionary query CATALOG "{query}"'
+    return f'<p class="quiet after">{count:,} {what} more: <code>{escape(asked)}</code></p>'
+
+
+def cluster_mark(cluster_id: int) -> Html:
+    """Write a cluster's mark in its colour; it says nothing that is not said in text beside it."""
+    colour = cluster_colour(cluster_id)
+    return Html(f'<span style="color:{colour}" aria-hidden="true">{cluster_character(cluster_id)}</span>')
