@@ -9,9 +9,11 @@ BIN := $(VENV)/bin
 PEERS := .venv-peers
 # Tests go to a process a core; a file of tests stays together, for what it prepares serves all of it.
 SHARED_OUT := -n auto --dist loadfile
-SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml')
+SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml' \
+	-o -name '*.js' -o -name '*.css' -o -name '*.html' -o -name '*.svg')
+PAGES := $(shell find README.md pipeline catalog workflows notebooks tests -name '*.md' -o -name '*.ipynb' -o -path '*/static/*')
 
-.PHONY: help demo test test-all bench bench-alignment bench-ask torture lint clean
+.PHONY: help demo test test-all bench bench-alignment bench-ask torture docs lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
@@ -20,6 +22,7 @@ help:
 	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment,"
 	@echo "               then questions to catalogs of up to 10,000 clips"
 	@echo "make torture   damage files, kill runs, fill disks, read while runs publish; an hour or more"
+	@echo "make docs      build the documentation site, with the notebooks run; some minutes"
 	@echo "make lint      check style, types and the direction of imports"
 	@echo "make clean     remove the environments and what the targets made"
 
@@ -52,6 +55,8 @@ torture: $(VENV)/installed
 	@echo "== Damaged files, killed runs, readers under writing, full disks: an hour or more"
 	$(BIN)/python -m tests.torture
 
+docs: motionary-docs/built
+
 lint: $(VENV)/installed
 	@echo "== Style, types, direction of imports"
 	$(BIN)/ruff check .
@@ -60,7 +65,7 @@ lint: $(VENV)/installed
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) $(PEERS) build motionary-demo motionary-bench .hypothesis .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(PEERS) build motionary-demo notebooks/motionary-demo motionary-docs motionary-bench .hypothesis .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name '*.egg-info' -o -name __pycache__ | xargs rm -rf
 
 $(VENV)/environment: constraints.txt pyproject.toml
@@ -86,4 +91,9 @@ $(VENV)/installed: $(VENV)/environment $(SOURCES)
 	@rm -rf build $(VENV)/lib/python*/site-packages/motionary
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build
+	@touch $@
+
+motionary-docs/built: $(VENV)/installed $(PAGES)
+	@echo "== The documentation site, in motionary-docs/: some minutes"
+	$(BIN)/python -m motionary.workflows.documentation motionary-docs
 	@touch $@

@@ -67,5 +67,5 @@ def stream_features(
 
 
 def _aligned_rates(catalog: Catalog) -> dict[str, float]:
-    table = catalog.alignments.to_arrow()
+    table = catalog.sql("select clip_id, frame_rate from alignments")
     return dict(zip(table["clip_id"].to_pylist(), table["frame_rate"].to_pylist(), strict=True))

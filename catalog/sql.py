@@ -73,11 +73,13 @@ class SqlSession:
         """
         import duckdb
 
-        with self._asking(self._snapshot) as cursor:
+        named = _named_in(query)
+        asked = {one: files for one, files in self._snapshot.tables.items() if one in _tables_of(named)}
+        with self._asking(asked) as cursor:
             statements = cursor.extract_statements(query)
             if [one.type for one in statements] != [duckdb.StatementType.SELECT]:
                 raise CatalogError(_ONLY_READ)
-            self._make_views(_named_in(query))
+            self._make_views(named)
             query = statements[0].query.rstrip().removesuffix(";")
             try:  # DuckDB takes `with x as (copy ... to ...)` for a selection, but not within another
                 cursor.execute(f"explain from (\n{query}\n)", parameters)
@@ -97,15 +99,15 @@ class SqlSession:
             One of them is damaged or gone.
         """
         listed = [self._store.full_path(file) for file in files]
-        with self._asking(replace(self._snapshot, tables={table: files})) as cursor:
+        with self._asking({table: files}) as cursor:
             reading = "read_parquet($files, hive_partitioning = false)"
             return cursor.sql(
                 query.format(files=reading), params={"files": listed, **parameters}
             ).to_arrow_table()
 
     @contextmanager
-    def _asking(self, snapshot: Snapshot) -> Iterator[duckdb.DuckDBPyConnection]:
-        """Give a cursor, and turn what is raised into an error that names the damaged file of a snapshot."""
+    def _asking(self, tables: Mapping[str, Sequence[str]]) -> Iterator[duckdb.DuckDBPyConnection]:
+        """Give a cursor, and turn what is raised into an error that names the damaged file of these tables."""
         import duckdb
 
         try:
@@ -114,12 +116,13 @@ class SqlSession:
         # RuntimeError: what DuckDB says of a damaged file can be no text.
         except (duckdb.Error, UnicodeDecodeError, RuntimeError) as error:
             wrong = (duckdb.ParserException, duckdb.CatalogException)  # the query is, and no file
-            damage = None if isinstance(error, wrong) else damaged_file(self._store, snapshot, PUBLISHED)
+            asked = replace(self._snapshot, tables=dict(tables))
+            damage = None if isinstance(error, wrong) else damaged_file(self._store, asked, PUBLISHED)
             why = " ".join(str(error).partition("\n\nLINE ")[0].split())
             raise CatalogError(damage or f"the query cannot be answered: {why}") from error
 
     def _make_views(self, names: set[str]) -> None:
-        tables = {one for name in names for one in _JOINED.get(name, (name,))}
+        tables = _tables_of(names)
         with self._lock:
             for name in PUBLISHED:
                 # An older motionary may have published the catalog without some.
@@ -153,6 +156,10 @@ def _named_in(query: str) -> set[str]:
     """Find the views whose names a query holds, as tables or not; all of them where it holds none."""
     known = {*PUBLISHED, *_JOINED}
     return known & set(re.findall(r"\w+", query.lower())) or known
+
+
+def _tables_of(names: set[str]) -> set[str]:
+    return {table for name in names for table in _JOINED.get(name, (name,))}
 
 
 def _text(text: str) -> str:

@@ -206,7 +206,7 @@ def test_two_nights(library, motionary, tmp_path):
     assert f"{first['run_id']} published, snapshot 000001" in out
     events = [line["event"] for line in logged(tmp_path)]
     assert events[:2] == ["started", "planned"]
-    assert events[-4:] == ["published", "vacuumed", "report", "finished"]
+    assert events[-5:] == ["published", "vacuumed", "report", "page", "finished"]
     catalog = Catalog.open(str(tmp_path / "catalog"))
     assert first["run_id"] == catalog.runs.to_arrow()["run_id"][-1].as_py()
     assert (first["status"], first["exit_code"], first["error"]) == ("published", 0, None)
@@ -236,7 +236,53 @@ def test_two_nights(library, motionary, tmp_path):
     assert quarantined["reason"]
     assert [one["path"] for one in second["quarantined"]] == ["walk/broken.bvh"]
     assert [len(second[name]) for name in ("removed", "moved", "relabelled")] == [1, 0, 0]
-    assert len(list((tmp_path / "reports").iterdir())) == 2
+    stems = {first["run_id"], second["run_id"]}
+    assert {one.name for one in (tmp_path / "reports").iterdir()} == {
+        f"{stem}.{suffix}" for stem in stems for suffix in ("json", "html")
+    }
+    page = (tmp_path / "reports" / f"{second['run_id']}.html").read_text()
+    assert "Since snapshot 000001 of" in page
+    assert "walk/<wbr>broken.bvh" in page
+
+
+def test_a_page_can_be_left_out(library, motionary, tmp_path):
+    file = configuration(tmp_path, "[report]\nhtml = false")
+    assert motionary("nightly", file)[0] == 0
+    assert [one.suffix for one in (tmp_path / "reports").iterdir()] == [".json"]
+    assert logged(tmp_path, "page") == []
+
+
+def test_a_refused_run_has_no_page(library, motionary, tmp_path):
+    spoil(library, 1)
+    file = configuration(tmp_path, "[limits]\nmax_quarantined = 0")
+    assert motionary("nightly", file)[0] == 1
+    assert [one.suffix for one in (tmp_path / "reports").iterdir()] == [".json"]
+    assert the_report(tmp_path)["status"] == "refused"
+
+
+def fault(*_, **__):
+    raise ZeroDivisionError("no such luck")
+
+
+def sigterm(*_, **__):
+    signal.raise_signal(signal.SIGTERM)
+    pytest.fail("SIGTERM was passed over while the page was made")
+
+
+@pytest.mark.parametrize(("spoiled", "told"), [(fault, "no such luck"), (sigterm, "stopped by SIGTERM")])
+def test_a_page_that_fails_changes_nothing_of_the_run(
+    library, motionary, tmp_path, monkeypatch, spoiled, told
+):
+    monkeypatch.setattr("motionary.workflows.report_page.report_page", spoiled)
+    file = configuration(tmp_path, "[finish]\ncommand = ['touch', 'announced']")
+    code, _, err = motionary("nightly", file)
+    assert (code, err) == (0, "")
+    assert [one.suffix for one in (tmp_path / "reports").iterdir()] == [".json"]
+    report = the_report(tmp_path)
+    assert (report["status"], report["exit_code"], report["error"]) == ("published", 0, None)
+    (line,) = logged(tmp_path, "page")
+    assert (line["ok"], line["error"]) == (False, told)
+    assert (tmp_path / "announced").exists()
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,14 @@ import typer
 
 from motionary.workflows.commands import (
     assign,
+    browse,
     check,
     explain,
     fetch,
     label,
     look,
     nightly,
+    report,
     reproduce,
     run,
     similar,
@@ -60,7 +62,21 @@ def motionary(
 
 
 # A module's EXAMPLES name its commands; the order is that of `motionary --help`.
-for module in (run, nightly, look, similar, assign, explain, take_out, snapshots, check, fetch, reproduce):
+for module in (
+    run,
+    nightly,
+    look,
+    report,
+    browse,
+    similar,
+    assign,
+    explain,
+    take_out,
+    snapshots,
+    check,
+    fetch,
+    reproduce,
+):
     for name, lines in module.EXAMPLES.items():
         app.command(name, epilog=examples(*lines))(getattr(module, name))
 app.add_typer(label.label, name="label")

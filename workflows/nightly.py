@@ -2,7 +2,8 @@
 
 It runs the main job, refuses to publish what exceeds a limit, deletes snapshots by the retention, and leaves
 a log and a report, whatever happens: a fault, a limit, or SIGTERM, which systemd, Kubernetes and SLURM send
-before they kill. Until the run publishes, in one step, the catalog is as it was.
+before they kill. Until the run publishes, in one step, the catalog is as it was. Where it did, the report
+has a page beside it.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from motionary.workflows.main_job import RunResult, run
 from motionary.workflows.nightly_settings import NightlySettings
 from motionary.workflows.plan import Plan
 from motionary.workflows.preparation import absolute
+from motionary.workflows.report_page import write_report_page
 from motionary.workflows.run_log import RunLog, logged_stages
 from motionary.workflows.run_report import RunReport, rows
 
@@ -191,11 +193,24 @@ def _tell(settings: NightlySettings, log: RunLog, report: RunReport) -> None:
         log("report", file=str(file))
     except OSError as error:
         _failed(log, report, f"the report cannot be written: {error}")
+    if settings.html and file and report.exit_code != FAILED:
+        _write_page(log, report, file.with_suffix(".html"))
     finish = settings.finish
     if finish.webhook:
         post_report(finish.webhook, report.to_json(), finish.timeout, log)
     if finish.command and file:
         run_command(finish.command, file, settings.file.parent, finish.command_timeout, log)
+
+
+def _write_page(log: RunLog, report: RunReport, file: Path) -> None:
+    """Show what was published; no fault of it, nor SIGTERM meanwhile, keeps the run from being announced."""
+    try:
+        with _on_sigterm(_stop), Catalog.open(absolute(report.catalog), report.snapshot_after) as catalog:
+            made = write_report_page(catalog, file)
+    except (Exception, Stopped, KeyboardInterrupt) as error:
+        log("page", ok=False, error="stopped by SIGTERM" if isinstance(error, Stopped) else str(error))
+    else:
+        log("page", ok=True, file=made.file, bytes=made.bytes)
 
 
 def _described(settings: NightlySettings) -> dict[str, Any]:

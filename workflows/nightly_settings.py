@@ -121,9 +121,10 @@ class LogTable(_Table):
 
 
 class ReportTable(_Table):
-    """`[report]`: the folder that takes `<run_id>.json`."""
+    """`[report]`: the folder that takes `<run_id>.json`, and whether there is a page beside it."""
 
     folder: Text = "reports"
+    html: bool = True
 
 
 class _Nightly(EnvironmentSettings):
@@ -153,6 +154,8 @@ class NightlySettings:
         File of the log; stderr where there is none.
     reports : Path
         Folder of the reports.
+    html : bool
+        Whether a run that publishes leaves a page there as well.
     """
 
     file: Path
@@ -162,6 +165,7 @@ class NightlySettings:
     finish: Finish
     log: Path | None
     reports: Path
+    html: bool
 
 
 def load_nightly(file: Path) -> NightlySettings:
@@ -196,6 +200,7 @@ def load_nightly(file: Path) -> NightlySettings:
         nightly.finish,
         folder / nightly.log.file if nightly.log.file else None,
         folder / nightly.report.folder,
+        nightly.report.html,
     )
 
 

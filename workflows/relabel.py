@@ -61,10 +61,39 @@ def relabel(
     UserError
         A clip is not in the library, a label is no name, or there is none to remove. Nothing has changed.
     """
+    return publish_labels(url, lambda current: _changed(current, changes, set_by), take_over)
+
+
+def publish_labels(
+    url: str,
+    changed: Callable[[Catalog], pa.Table],
+    take_over: Callable[[Writer], object] = lambda writer: None,
+) -> Catalog:
+    """Publish other labels, made from those that are there while nobody else can change them.
+
+    Parameters
+    ----------
+    url : str
+        The catalog.
+    changed : callable
+        Makes table `labels` anew, of the catalog as it is; what it raises is raised, and nothing changed.
+    take_over : callable
+        Told of a writer of this catalog that died.
+
+    Returns
+    -------
+    Catalog
+        Opened at the new snapshot; at the old one where the table is as it was.
+
+    Raises
+    ------
+    CatalogError
+        There is no catalog, an older motionary published it, or another process writes it.
+    """
     store = Store(absolute(url))
     Catalog.open(store.url).close()  # a folder that is none is not locked
     with the_only_writer(store, take_over), Catalog.open(store.url) as current:
-        labels = _changed(current, changes, set_by)
+        labels = changed(current)
         if not labels.equals(current.labels.to_arrow()):
             _publish(current, labels)
     return Catalog.open(store.url)

@@ -15,6 +15,7 @@
 | vacuumed | snapshots, files, bytes that are gone, held (snapshots that only a reader keeps) |
 | failed | error, traceback (of a fault that is ours) |
 | report | file |
+| page | ok, and file, bytes or error |
 | webhook, command | ok, error where it is not |
 | finished | status, exit_code, seconds |
 """

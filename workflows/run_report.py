@@ -1,5 +1,7 @@
 """The report of a nightly run: `<run_id>.json`, written whole or not at all, also when the run fails.
 
+A run that published leaves a page, `<run_id>.html`, beside it: see `motionary.workflows.report_page`.
+
 Where another run has a report of that name, as one of another catalog that began in the same second, this one
 is `<run_id>-2.json`: no report takes another's place.
 """

@@ -60,7 +60,7 @@ def isolated(name: str) -> Html:
 
     A line may end after its slashes and underscores.
     """
-    return Html(f"<bdi>{_BREAKS.sub('<wbr>', name)}</bdi>")
+    return Html(f"<bdi>{_BREAKS.sub('<wbr>', escape(name))}</bdi>")
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:

@@ -134,7 +134,7 @@ def _relabel(url: str, changes: Mapping[str, str | None], as_json: bool) -> None
     from motionary.workflows.tables import write_json
 
     take_over = lambda dead: _say(f"taking over from a run that died: {dead}")  # noqa: E731
-    with open_catalog(url) as before, relabel(url, changes, _user(), take_over) as after:
+    with open_catalog(url) as before, relabel(url, changes, current_user(), take_over) as after:
         snapshot_id = after.snapshot.snapshot_id
         changed = before.snapshot.snapshot_id != snapshot_id
     if as_json:
@@ -146,7 +146,7 @@ def _relabel(url: str, changes: Mapping[str, str | None], as_json: bool) -> None
         _say(f"{why}; nothing was changed")
 
 
-def _user() -> str:
+def current_user() -> str:
     """Name who is at work; by number where the system knows no name."""
     import getpass
     import os

@@ -1,0 +1,152 @@
+"""The report of a run: one page that shows what changed, plays every cluster, and says what to look at.
+
+It needs nothing from outside itself and stays under 10 MB: Plotly's script and the charts lie in it packed,
+takes as slim figures, each unpacked when it is looked at. Of a large catalog it shows the largest clusters
+and the first rows of long tables, and says at each place what it leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from motionary.catalog.errors import CatalogError
+from motionary.catalog.query import Catalog
+from motionary.catalog.views.assets import asset
+from motionary.catalog.views.cluster_map import cluster_map_figure
+from motionary.catalog.views.dendrogram import dendrogram_figure
+from motionary.catalog.views.label_confusion import confusion_figure
+from motionary.catalog.views.mu_kappa import mu_kappa_figure
+from motionary.catalog.views.packed import data_element, packed_chart, packed_plotly
+from motionary.catalog.views.page import page, section
+from motionary.catalog.views.player import json_in_script
+from motionary.catalog.views.report_cards import (
+    MOST_CARDS,
+    cards_section,
+    cluster_cards,
+    takes_by_importance,
+)
+from motionary.catalog.views.report_changes import changes_section
+from motionary.catalog.views.report_footage import footage_of
+from motionary.catalog.views.report_review import review_queue, review_section, reviewed_clips
+from motionary.catalog.views.report_run import settings_section, timings_section
+from motionary.catalog.views.sections import (
+    catalog_name,
+    dendrogram_section,
+    heading,
+    quarantine_section,
+    scores_section,
+    threshold_section,
+)
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+_MOST_QUARANTINED = 200
+
+_CONTENTS = {
+    "changes": "Changes",
+    "clusters": "Clusters",
+    "review": "Review",
+    "quarantine": "Quarantine",
+    "map": "Map",
+    "labels": "Labels",
+    "dendrogram": "Dendrogram",
+    "thresholds": "Thresholds",
+    "distances": "Distances",
+    "timings": "Timings",
+    "settings": "Settings",
+}
+
+
+def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
+    """Show a run on one HTML page.
+
+    Parameters
+    ----------
+    catalog : Catalog
+        An opened catalog; it may hold no clip.
+    before : Catalog, optional
+        An earlier snapshot, to tell what changed since; see `snapshot_before`.
+
+    Returns
+    -------
+    str
+        HTML with everything it needs inside.
+    """
+    cards, queue = cluster_cards(catalog), review_queue(catalog)
+    footage = footage_of(catalog, chain(takes_by_importance(cards[:MOST_CARDS]), reviewed_clips(queue)))
+    charts = {
+        "map": cluster_map_figure(catalog) if len(catalog.clips) > 1 else None,
+        "labels": confusion_figure(catalog),
+        "dendrogram": dendrogram_figure(catalog),
+        "thresholds": mu_kappa_figure(catalog),
+    }
+    body = [
+        changes_section(catalog, before),
+        cards_section(cards, footage),
+        review_section(queue, footage),
+        quarantine_section(catalog, _MOST_QUARANTINED),
+        _map_section(charts["map"]),
+        _labels_section(charts["labels"]),
+        dendrogram_section(catalog, charts["dendrogram"], packed_chart),
+        threshold_section(charts["thresholds"], packed_chart),
+        scores_section(catalog),
+        timings_section(catalog),
+        settings_section(catalog),
+    ]
+    data = [*footage.elements, data_element(json_in_script(dict(footage.figures)), "figures")]
+    if any(charts.values()):
+        data.append(packed_plotly())
+    return page(
+        f"{catalog_name(catalog)}, snapshot {catalog.snapshot.snapshot_id}: motionary report",
+        body,
+        head=f"<style>\n{asset('report.css')}</style>",
+        before=[_SKIP, f"<header>\n{heading(catalog)}\n</header>", _contents(body)],
+        after=[*data, f'<script type="module">\n{asset("player.js")}\n{{\n{asset("report.js")}}}\n</script>'],
+    )
+
+
+def snapshot_before(catalog: Catalog) -> Catalog | None:
+    """Open the newest snapshot that is older than a catalog's own, None where none is left."""
+    earlier = [one for one in catalog.snapshots() if int(one) < int(catalog.snapshot.snapshot_id)]
+    for snapshot_id in reversed(earlier):
+        with suppress(CatalogError):  # vacuumed since they were listed, or damaged: no matter here
+            return Catalog.open(catalog.store.url, snapshot_id)
+    return None
+
+
+_SKIP = '<a class="skip" href="#main">Skip to the content</a>'
+
+
+def _contents(body: Sequence[str]) -> str:
+    there = [name for name in _CONTENTS if any(f'<section id="{name}">' in one for one in body)]
+    links = "".join(f'<li><a href="#{name}">{_CONTENTS[name]}</a></li>' for name in there)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def _map_section(figure: go.Figure | None) -> str:
+    title = "Map"
+    if figure is None:
+        return section(title, "A map needs two clips.", name="map")
+    return section(
+        title,
+        "Every clip is a point, and clips that move alike lie together. Press one to play it, where the page "
+        "holds it: the takes of the cards above.",
+        packed_chart(figure, "map-chart"),
+        '<p class="quiet" id="map-said" role="status"></p>\n<div class="stage" id="map-stage"></div>',
+        name="map",
+    )
+
+
+def _labels_section(figure: go.Figure | None) -> str:
+    if figure is None:
+        return ""
+    return section(
+        "Labels against clusters",
+        "How many of the clips that have each label of their own lie in which cluster.",
+        packed_chart(figure, "labels-chart"),
+        name="labels",
+    )

@@ -1,0 +1,60 @@
+"""The page that compares two clips: both in one scene, and why they are as far apart as they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from motionary.catalog.explanation import Explanation
+from motionary.catalog.views.chart_text import short_text
+from motionary.catalog.web.data import explanation, require
+from motionary.catalog.web.render import render, shown_to
+from motionary.catalog.web.search import clip_rows
+
+_METRICS = {
+    "dtw": "average cost along the best warping path",
+    "b_dtw": "the same, with one of them forwards or backwards, whichever is the nearer",
+    "weighted": "the DTW-Curve, summed up with weights",
+    "fuzzy": "from the least to the greatest of the curve",
+}
+
+
+def compare(request: Request) -> Response:
+    """Answer /compare?a=&b=; where one is missing, the page asks for it."""
+    shown = shown_to(request)
+    a, b = request.query_params.get("a", ""), request.query_params.get("b", "")
+    given = [one for one in (a, b) if one]
+    require(shown, *given)
+    why = explanation(shown, a, b) if len(given) == 2 else None
+    return render(
+        request,
+        "compare.html",
+        a=a,
+        b=b,
+        why=why,
+        rows=clip_rows(shown.catalog, given),
+        distances=_distances(why) if why else [],
+        parts=_parts(why) if why else [],
+        short=short_text,
+    )
+
+
+def _distances(why: Explanation) -> list[tuple[str, str, str, bool]]:
+    """List every distance: name, figure, meaning, whether the clusters are made of it."""
+    found = why.distances
+    values = {name: f"{found[name]:.4f}" for name in _METRICS if name in found}
+    values["fuzzy"] = f"{found['fuzzy_low']:.4f} to {found['fuzzy_high']:.4f}"
+    return [(name, values[name], meaning, name == why.metric) for name, meaning in _METRICS.items()]
+
+
+def _parts(why: Explanation) -> list[dict[str, Any]]:
+    """List what every joint, and travel, adds to the distance, the most first."""
+    end = "fuzzy_high" if why.metric == "fuzzy" else why.metric
+    parts = sorted(why.contributions[end].items(), key=lambda one: -one[1])
+    total, most = sum(value for _, value in parts) or 1.0, parts[0][1] or 1.0
+    return [
+        {"name": name.replace("_", " "), "adds": value, "share": value / total, "bar": max(0.0, value / most)}
+        for name, value in parts
+    ]
