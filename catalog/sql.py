@@ -107,7 +107,7 @@ class SqlSession:
 
     @contextmanager
     def _asking(self, tables: Mapping[str, Sequence[str]]) -> Iterator[duckdb.DuckDBPyConnection]:
-        """Give a cursor, and turn what is raised into an error that names the damaged file of these tables."""
+        """Give a cursor, and turn what is raised into an error that names these tables' damaged file."""
         import duckdb
 
         try:

@@ -16,13 +16,14 @@ from motionary.catalog import Catalog
 from motionary.catalog.history import diff
 from motionary.catalog.store import Store
 from motionary.catalog.vacuum import vacuum
-from motionary.catalog.views import report_cards, report_review
 from motionary.catalog.views.figures import clip_figure
-from motionary.catalog.views.packed import packed_chart, packed_plotly
-from motionary.catalog.views.report import report_page, snapshot_before
-from motionary.catalog.views.report_cards import cluster_cards, takes_by_importance
-from motionary.catalog.views.report_changes import MOST_ROWS, changes_section
-from motionary.catalog.views.report_footage import footage_of
+from motionary.catalog.views.report import cards as report_cards
+from motionary.catalog.views.report import review as report_review
+from motionary.catalog.views.report.cards import cluster_cards, takes_by_importance
+from motionary.catalog.views.report.changes import MOST_ROWS, changes_section
+from motionary.catalog.views.report.footage import footage_of
+from motionary.catalog.views.report.packed import packed_chart, packed_plotly
+from motionary.catalog.views.report.page import report_page, snapshot_before
 from motionary.pipeline.config import FeatureConfig, PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionary.catalog import Catalog
-from motionary.catalog.views.report import report_page, snapshot_before
+from motionary.catalog.views.report.page import report_page, snapshot_before
 from motionary.pipeline.writers import whole_file
 from motionary.workflows.errors import UserError
 

@@ -8,5 +8,5 @@ from importlib.resources import files
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a file of this package, such as `style.css`."""
+    """Return the text of a file of this package, such as `style.css` or `report/report.js`."""
     return files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from motionary.catalog import Catalog
-from motionary.catalog.views.report import report_page
+from motionary.catalog.views.report.page import report_page
 from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job

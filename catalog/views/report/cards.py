@@ -12,7 +12,7 @@ from typing import Any
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.page import Cell, Html, details, isolated, section, table
-from motionary.catalog.views.report_footage import Footage
+from motionary.catalog.views.report.footage import Footage
 from motionary.catalog.views.sections import cluster_mark, left_out
 
 MOST_CARDS = 60

@@ -13,8 +13,8 @@ from html import escape
 from motionary.catalog.motions import stream_motions
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.figures import clip_figures
-from motionary.catalog.views.packed import data_element
 from motionary.catalog.views.player import json_in_script
+from motionary.catalog.views.report.packed import data_element
 from motionary.catalog.views.thumbnail import thumbnail_of
 
 MOST_BYTES = 5_000_000

@@ -19,19 +19,19 @@ from motionary.catalog.views.cluster_map import cluster_map_figure
 from motionary.catalog.views.dendrogram import dendrogram_figure
 from motionary.catalog.views.label_confusion import confusion_figure
 from motionary.catalog.views.mu_kappa import mu_kappa_figure
-from motionary.catalog.views.packed import data_element, packed_chart, packed_plotly
 from motionary.catalog.views.page import page, section
 from motionary.catalog.views.player import json_in_script
-from motionary.catalog.views.report_cards import (
+from motionary.catalog.views.report.cards import (
     MOST_CARDS,
     cards_section,
     cluster_cards,
     takes_by_importance,
 )
-from motionary.catalog.views.report_changes import changes_section
-from motionary.catalog.views.report_footage import footage_of
-from motionary.catalog.views.report_review import review_queue, review_section, reviewed_clips
-from motionary.catalog.views.report_run import settings_section, timings_section
+from motionary.catalog.views.report.changes import changes_section
+from motionary.catalog.views.report.footage import footage_of
+from motionary.catalog.views.report.packed import data_element, packed_chart, packed_plotly
+from motionary.catalog.views.report.review import review_queue, review_section, reviewed_clips
+from motionary.catalog.views.report.run import settings_section, timings_section
 from motionary.catalog.views.sections import (
     catalog_name,
     dendrogram_section,
@@ -103,9 +103,9 @@ def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
     return page(
         f"{catalog_name(catalog)}, snapshot {catalog.snapshot.snapshot_id}: motionary report",
         body,
-        head=f"<style>\n{asset('report.css')}</style>",
+        head=f"<style>\n{asset('report/report.css')}</style>",
         before=[_SKIP, f"<header>\n{heading(catalog)}\n</header>", _contents(body)],
-        after=[*data, f'<script type="module">\n{asset("player.js")}\n{{\n{asset("report.js")}}}\n</script>'],
+        after=[*data, _script()],
     )
 
 
@@ -119,6 +119,10 @@ def snapshot_before(catalog: Catalog) -> Catalog | None:
 
 
 _SKIP = '<a class="skip" href="#main">Skip to the content</a>'
+
+
+def _script() -> str:
+    return f'<script type="module">\n{asset("player.js")}\n{{\n{asset("report/report.js")}}}\n</script>'
 
 
 def _contents(body: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from motionary.catalog.errors import CatalogError
 from motionary.catalog.query import Catalog
 from motionary.catalog.review import review
 from motionary.catalog.views.page import Cell, Html, details, isolated, section, table
-from motionary.catalog.views.report_footage import Footage
+from motionary.catalog.views.report.footage import Footage
 
 MOST_CLIPS = 3000
 """Of a catalog whose queue is looked for: it goes over all pairs of clips."""
