@@ -17,6 +17,7 @@ from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.distances.tiles import usable_processors
 from motionary.pipeline.synthetic import write_library
+from motionary.workflows.commands.options import COMPILING
 from motionary.workflows.main_job import run
 from motionary.workflows.plan import Plan
 from motionary.workflows.preparation import Job
@@ -24,8 +25,6 @@ from motionary.workflows.settings import load_settings
 
 DEMO = "motionary-demo"
 """Where `motionary demo` leaves the embedded library and its catalog."""
-
-_COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
 
 
 def catalog_of(place: str | os.PathLike[str] = "") -> Catalog:
@@ -94,7 +93,7 @@ def make_catalog(
     roots = [os.fspath(one) for one in libraries]
     settings = config or load_settings(None, {})
     job = Job(roots, os.fspath(catalog), settings, labels, workers, label_pattern=label_pattern)
-    return run(job, _quiet, compiling=lambda: print(_COMPILING), planned=_announcer(job)).catalog
+    return run(job, _quiet, compiling=lambda: print(COMPILING), planned=_announcer(job)).catalog
 
 
 def _demo() -> Catalog:

@@ -108,10 +108,11 @@ class Player {
     Object.assign(this.settings, { layout, aligned, colour, trails });
     this.controls.show();
     this.allow();
-    this.settings.follow = false;
+    Object.assign(this.settings, { follow: false, inPlace: false });
     this.arrange();
-    const far = this.room(true).footprint * 1.6;
-    this.set(this.box.footprint > far ? { follow: true } : {});
+    const followed = this.room(true).footprint;
+    if (followed > WIDEST) this.set({ inPlace: true }); // figures that go apart would all be small
+    else this.set(this.box.footprint > 1.6 * followed ? { follow: true } : {});
   }
 
   play() {
@@ -515,7 +516,8 @@ function hottestOf(figures) {
 
 // Which settings make sense for these figures.
 function offered(figures) {
-  const warped = figures.filter((one) => one.warp);
+  // A reference alone runs in its own time already.
+  const warped = figures.filter((one) => one.warp && (figures.length > 1 || !one.clip_id || one.warp.reference !== one.clip_id));
   return {
     time: figures.some((one) => one.frames > 1),
     overlaid: figures.length > 1,
@@ -528,6 +530,7 @@ function offered(figures) {
 
 // ---- the camera
 
+const WIDEST = 4; // body sizes that figures may be apart while the camera follows them
 const VIEWS = { front: [0.4, 0.2], side: [Math.PI / 2, 0.1], top: [0, 1.5] }; // yaw and pitch
 const FIELD = Math.tan((14 * Math.PI) / 180); // of half the angle of view
 

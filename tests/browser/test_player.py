@@ -247,8 +247,28 @@ def test_what_makes_no_sense_is_not_offered(shown, pair):
         page.get_by_role("button").all_text_contents()
     )
     strangers = [pair[1], replace(pair[0], reference="another")]
-    page = shown(scene(strangers))
-    assert "Aligned" not in page.get_by_role("button").all_text_contents()
+    for figures in (strangers, [pair[0]]):  # to two references; a reference alone
+        page = shown(scene(figures))
+        assert "Aligned" not in page.get_by_role("button").all_text_contents()
+    page = shown(scene([pair[1]]))
+    assert "Aligned" in page.get_by_role("button").all_text_contents()
+
+
+def test_the_camera_keeps_figures_large(shown):
+    walk = template("walk")
+    end = np.linspace(0, 1, walk.frames)[:, None]
+    far = 20 * walk.positions()[0, :, 1].max()
+    left, right = (replace(walk, root_position=walk.root_position + end * [x, 0, 0]) for x in (-far, far))
+    page = shown(
+        scene([figure_of(template("wave"))]),
+        scene([figure_of(left)]),
+        scene(list(map(figure_of, (left, right)))),
+    )
+    for player, (follow, in_place) in enumerate([(False, False), (True, False), (False, True)]):
+        page.locator(f"#p{player}").scroll_into_view_if_needed()
+        page.wait_for_function(f"document.getElementById('p{player}').player")
+        state = call(page, "p.state", player)
+        assert (state["follow"], state["inPlace"]) == (follow, in_place)
 
 
 def test_residual_and_contacts_follow_their_frames(shown, pair):
