@@ -52,7 +52,7 @@ class Description:
             ("catalog", f"{self.url}, snapshot {self.snapshot_id} of {self.published_at}"),
             (
                 "clips",
-                f"{self.clips}, {_duration(self.seconds)} in all; {self.quarantined} quarantined",
+                f"{self.clips}, {duration(self.seconds)} in all; {self.quarantined} quarantined",
             ),
             ("clusters", f"{self.clusters}"),
             ("names", _counted(self.names, "clips have none")),
@@ -102,7 +102,8 @@ def _counted(counts: Mapping[str, int], none: str, most: int = 12) -> str:
     return ", ".join(listed + more) or none
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Write a length as people read it."""
     if seconds < 120:
         return f"{seconds:.1f} s"
     return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

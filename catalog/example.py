@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from motionary.catalog.errors import CatalogError, nearest
+from motionary.catalog.errors import CatalogError, NoClips, nearest
 from motionary.catalog.places import batch_of, rows_by_clip
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.stages.columns import matrix, per_clip
@@ -135,7 +135,7 @@ def library_features(catalog: Catalog) -> LibraryFeatures:
             for clip_id, rows in per_clip(catalog.store.read([file])).items()
         }
         if not clips:
-            raise CatalogError(f"{catalog.store.url} has no clips, and so nothing to compare with")
+            raise NoClips(f"{catalog.store.url} has no clips, and so nothing to compare with")
         clip_ids = sorted(clips)
         return LibraryFeatures(clip_ids, [clips[clip_id] for clip_id in clip_ids])
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import pyarrow as pa
 
-from motionary.catalog.errors import CatalogError, nearest
+from motionary.catalog.errors import CatalogError, UnknownClip, nearest
 from motionary.catalog.leases import Lease
 from motionary.catalog.motions import stream_motions
 from motionary.catalog.opening import open_snapshot
@@ -396,13 +396,13 @@ class Catalog:
 
         Raises
         ------
-        CatalogError
+        UnknownClip
             There is none of a name; the message tells the nearest names.
         """
         known = self.keep("clips", lambda: dict.fromkeys(self.clips.to_arrow()["clip_id"].to_pylist()))
         for clip_id in clip_ids:
             if clip_id not in known:
-                raise CatalogError(f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, [*known])}")
+                raise UnknownClip(f"no clip {clip_id!r} in {self.store.url}{nearest(clip_id, [*known])}")
 
     def _motion(self, clip_id: str, aligned: bool) -> Motion:
         self.require(clip_id)

@@ -46,8 +46,15 @@ REVIEW = pa.schema(
     ]
 )
 
-REASONS = ("moved", "contradiction", "mislabelled", "uncertain", "unassigned", "duplicate")
-"""The first of those of equal urgency is told."""
+REASONS = {
+    "moved": "a file with its bytes had a label and is gone, and it is not clear which is meant",
+    "contradiction": "the same motion, or almost, has another label elsewhere",
+    "mislabelled": "its label is not that of its cluster",
+    "uncertain": "its name came from the cluster, with little confidence",
+    "unassigned": "it has no name",
+    "duplicate": "an earlier clip is the same motion, or almost",
+}
+"""What a clip is listed for, in a few words; the first of those of equal urgency is told."""
 
 _SIDES = """select clip_a as clip_id, clip_b as other, {metric}::double as distance from pairs
     union all select clip_b, clip_a, {metric}::double from pairs"""

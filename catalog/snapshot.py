@@ -91,12 +91,14 @@ def current_id(store: Store) -> str | None:
     Raises
     ------
     CatalogError
-        `CURRENT` holds no snapshot's id.
+        `CURRENT` holds no snapshot's id, or the store is a file.
     """
     try:
         content = store.read_bytes(CURRENT)
     except FileNotFoundError:
         return None
+    except NotADirectoryError:
+        raise CatalogError(f"{store.url} is a file; a catalog is a folder, name that") from None
     name = content.decode(errors="replace").strip()
     if not _is_id(name):
         raise CatalogError(f"{store.full_path(CURRENT)} holds {name[:40]!r}, not a snapshot's id; {_MEND}")

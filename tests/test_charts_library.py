@@ -4,7 +4,9 @@ import json
 import re
 import subprocess
 import sys
+import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from itertools import combinations
 from xml.etree import ElementTree
@@ -163,6 +165,25 @@ laid_out(numpy.abs(numpy.subtract.outer(numpy.arange(20), numpy.arange(20))))
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (done.stdout.strip(), done.stderr) == ("{1}", "")
+
+
+def test_two_layouts_leave_the_threads_as_they_were(monkeypatch):
+    """The limit is the process's: of two that overlap, the second would find one thread and put that back."""
+    inside, most, scaled = [], [], embedding._scaled
+
+    def watched(distances):
+        inside.append(distances)
+        most.append(len(inside))
+        time.sleep(0.1)
+        places = scaled(distances)
+        inside.pop()
+        return places
+
+    monkeypatch.setattr(embedding, "_scaled", watched)
+    distances = np.abs(np.subtract.outer(np.arange(5.0), np.arange(5.0)))
+    with ThreadPoolExecutor(3) as threads:
+        list(threads.map(laid_out, [distances] * 3))
+    assert most == [1, 1, 1]
 
 
 # --- the map -------------------------------------------------------------------------------------------
@@ -344,6 +365,8 @@ def test_style_space_shows_the_scores_of_a_cluster(demo):
     ring = figure.data[-1]
     assert (ring.x[0], ring.y[0]) == pytest.approx(shown[styles[0]["reference_id"]])
     assert f"{styles[0]['explained'][0]:.0%}" in figure.layout.xaxis.title.text
+    for axis in (figure.layout.xaxis, figure.layout.yaxis):
+        assert "(" not in axis.title.text  # radians and lengths are weighed together: there is no one unit
     assert {trace.legendgrouptitle.text for trace in figure.data[:-1]} == {"style"}
     assert style_figure(demo, 1) == figure
 

@@ -12,7 +12,7 @@ from scipy.cluster.hierarchy import linkage
 from scipy.spatial.distance import pdist
 
 from motionary.catalog import Catalog, CatalogError
-from motionary.catalog.views import cost_matrix
+from motionary.catalog.views import cost_matrix, mu_kappa
 from motionary.catalog.views.chart_text import full_text, short_text
 from motionary.catalog.views.cost_matrix import cost_matrix_figure, mean_of_blocks
 from motionary.catalog.views.curve_chart import curve_figure
@@ -480,6 +480,19 @@ def test_mu_kappa_has_a_row_of_strips_for_every_distance(demo):
         (star,) = [place for place, text in enumerate(band.text) if "★" in text]
         np.testing.assert_allclose(ends[star], [one.cut["strip_low"], one.cut["strip_high"]])
         assert band.text[star] == f"{one.cut['strip_clusters']} ★"
+
+
+def test_every_distance_has_a_curve_of_its_own_style(demo, monkeypatch):
+    curves = [
+        replace(one, cut=one.cut | {"metric": f"{one.cut['metric']} {time}"})
+        for time in range(2)
+        for one in linkages_by_distance(demo)
+    ]
+    monkeypatch.setattr(mu_kappa, "linkages_by_distance", lambda catalog: curves)
+    lines = [trace.line for trace in mu_kappa_figure(demo).data if trace.type == "scatter"]
+    assert [(line.color, line.dash) for line in lines if line.shape == "hv"] == [
+        (line_style(number).colour, line_style(number).dash) for number in range(1, len(curves) + 1)
+    ]
 
 
 # Names

@@ -260,6 +260,15 @@ def test_a_refused_run_has_no_page(library, motionary, tmp_path):
     assert the_report(tmp_path)["status"] == "refused"
 
 
+def test_what_fails_after_publishing_leaves_the_page(library, motionary, tmp_path, monkeypatch):
+    monkeypatch.setattr("motionary.workflows.nightly.vacuum", fault)
+    assert motionary("nightly", configuration(tmp_path, "[retention]\nkeep = 1"))[0] == 1
+    report = the_report(tmp_path)
+    assert (report["status"], report["exit_code"]) == ("published", 1)
+    assert "no such luck" in report["error"]
+    assert {one.suffix for one in (tmp_path / "reports").iterdir()} == {".json", ".html"}
+
+
 def fault(*_, **__):
     raise ZeroDivisionError("no such luck")
 

@@ -138,6 +138,10 @@ def test_a_library_is_run_into_the_working_folder(demo_library, tmp_path, monkey
     again = catalog_of(library)
     assert again.last_run["clips_read"] == again.last_run["pairs_computed"] == 0
     assert capsys.readouterr().out == ""
+    (tmp_path / "elsewhere" / "takes").mkdir(parents=True)
+    with pytest.raises(UserError, match="is the catalog of"):  # of one that is only called alike
+        catalog_of("elsewhere/takes")
+    assert Catalog.open("takes-catalog").snapshot.snapshot_id == again.snapshot.snapshot_id
 
 
 def test_a_place_that_is_neither_says_what_to_do(tmp_path):
@@ -145,6 +149,9 @@ def test_a_place_that_is_neither_says_what_to_do(tmp_path):
         catalog_of(tmp_path / "nothing")
     with pytest.raises(UserError, match="no motion files"):
         catalog_of(tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CatalogError, match="is a file; a catalog is a folder"):
+        catalog_of(tmp_path / "file")
 
 
 @pytest.mark.slow

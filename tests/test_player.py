@@ -15,6 +15,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 
 from motionary.catalog import Catalog, CatalogError
 from motionary.catalog.views.assets import asset
+from motionary.catalog.views.colours import COLOURS
 from motionary.catalog.views.figure_body import body_size
 from motionary.catalog.views.figure_data import packed
 from motionary.catalog.views.figures import clip_figure, figure_of, scene
@@ -24,7 +25,7 @@ from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.features import sample_times
 from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.style import residual
+from motionary.pipeline.style import residual, standing_toes
 from motionary.pipeline.synthetic import template
 from tests.style.figures import moved
 
@@ -99,7 +100,7 @@ def test_places_are_those_of_the_motion(seed, frames, joints, unit, away, fps, m
     np.testing.assert_allclose(by_hand(made), true, rtol=0, atol=0.5001 * made["scale"])
     span = np.ptp(true, axis=(0, 1)).max()
     assert made["scale"] <= max(2e-4 * made["size"], 1.0001 * span / 65534)
-    assert made["floor"] == true[..., 1].min()
+    assert made["floor"] == pytest.approx(true[..., 1].min(), rel=1e-12, abs=1e-12 * made["size"])
 
 
 def test_places_of_frames_are_kept_at_a_rate_below_thirty():
@@ -178,10 +179,11 @@ def test_residual_is_that_of_the_poses(demo):
     figure = clip_figure(demo, row["clip_id"])
     pose = residual(demo.aligned(row["clip_id"]), demo.aligned(row["reference_id"]), "pose")
     distance = np.linalg.norm(pose.joints, axis=2)
-    own = figure.residual[:, [figure.body[joint] for joint in CANONICAL_JOINTS]]
+    shares = figure.residual[:, [figure.body[joint] for joint in CANONICAL_JOINTS]]
+    own = shares * figure.residual_max / 255
     # That one turns to the heading after it is warped, this one before.
     np.testing.assert_allclose(own, distance, atol=0.02)
-    assert clip_figure(demo, row["reference_id"]).residual.max() < 1e-6
+    assert clip_figure(demo, row["reference_id"]).residual_max < 1e-6
 
 
 def test_residual_is_read_again():
@@ -201,12 +203,13 @@ def test_residual_needs_its_warp():
         figure_of(motion, residual=np.zeros((3, 4)))
 
 
-def test_toes_stand_while_they_are_low_and_still(demo):
+def test_toes_stand_as_the_pipeline_says():
     walk = figure_of(template("walk"))
     assert [walk.joints[joint] for joint in walk.contacts] == [
         walk.joints[walk.body[f"{side}_toe"]] for side in ("left", "right")
     ]
     left, right = walk.contacts.values()
+    np.testing.assert_array_equal(np.stack([left, right], axis=1), standing_toes(template("walk")))
     assert 0.3 < left.mean() < 0.95
     assert (left | right).mean() > 0.8
     assert not (left & right).all()
@@ -220,6 +223,14 @@ def test_unknown_rig_is_a_figure():
     made = figure_of(Motion("m", skeleton, 30, np.zeros((4, 3)), [[[0, 0, 0, 1]] * 2] * 4)).to_dict()
     assert made["body"] == {}
     assert "contacts" not in made
+
+
+def test_figure_without_legs_stands_nowhere():
+    walk = template("walk")
+    skeleton = replace(walk.skeleton, offsets=np.zeros_like(walk.skeleton.offsets))
+    figure = figure_of(replace(walk, skeleton=skeleton))
+    assert figure.body
+    assert figure.contacts == {}
 
 
 def test_scene_needs_a_figure():
@@ -263,6 +274,11 @@ def test_script_is_one_module_that_fetches_nothing():
     assert "http" not in script
     assert not re.search(r"^\s*import\b|\bimport\(", script, re.MULTILINE)
     assert player_script().count("<script") == 1
+
+
+def test_script_has_the_colours_of_the_charts():
+    (listed,) = re.findall(r"const COLOURS = (\[.*?\]);", asset("player.js"))
+    assert tuple(json.loads(listed)) == COLOURS
 
 
 def test_notebook_shows_a_widget_and_a_page(demo):

@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +13,7 @@ import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
 
-from motionary.catalog import Catalog
+from motionary.catalog import Catalog, CatalogError
 from motionary.catalog.history import diff
 from motionary.catalog.store import Store
 from motionary.catalog.vacuum import vacuum
@@ -20,10 +21,16 @@ from motionary.catalog.views.figures import clip_figure
 from motionary.catalog.views.report import cards as report_cards
 from motionary.catalog.views.report import review as report_review
 from motionary.catalog.views.report.cards import cluster_cards, takes_by_importance
-from motionary.catalog.views.report.changes import MOST_ROWS, changes_section
+from motionary.catalog.views.report.changes import (
+    MOST_ROWS,
+    changes_section,
+    changes_since,
+    changes_since_last,
+)
 from motionary.catalog.views.report.footage import footage_of
 from motionary.catalog.views.report.packed import packed_chart, packed_plotly
-from motionary.catalog.views.report.page import report_page, snapshot_before
+from motionary.catalog.views.report.page import report_page
+from motionary.catalog.views.sections import heading
 from motionary.pipeline.config import FeatureConfig, PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
@@ -176,12 +183,19 @@ def test_what_does_not_fit_is_a_picture(demo):
     assert [*footage.figures][:4] == wanted[:4]
     assert wanted[4] not in footage.figures
     assert footage.thumbnails.keys() == set(wanted)
-    assert footage.without_figure == len(wanted) - len(footage.figures)
     assert "<button" in footage.button("stage", "Play", "", wanted[0])
     assert "<button" not in footage.button("stage", "Play", "", wanted[0], wanted[4])
     assert "<svg" in footage.button("stage", "Play", "", wanted[0], wanted[4])
-    text = report_cards.cards_section(cluster_cards(demo), footage)
-    assert f"{footage.without_figure} takes are too long" in text
+
+
+def test_pictures_without_a_button_are_counted(demo):
+    cards = cluster_cards(demo)
+    footage = footage_of(demo, takes_by_importance(cards))
+    assert "no room" not in report_cards.cards_section(cards, footage)
+    without = {clip: name for clip, name in footage.figures.items() if clip != cards[0].row["reference"]}
+    text = report_cards.cards_section(cards, replace(footage, figures=without))
+    assert text.count('class="still"') - text.count('class="take"') == 3  # what it is shown beside as well
+    assert "Takes that have no room on this page and are pictures only: 3." in text
 
 
 def test_a_large_catalog_says_what_is_left_out(demo, monkeypatch):
@@ -192,6 +206,8 @@ def test_a_large_catalog_says_what_is_left_out(demo, monkeypatch):
     html = report_page(demo)
     page = check(html)
     assert page.elements.count("article") == 3
+    shown = [clip["clip_id"] for card in cluster_cards(demo)[:3] for clip in card.takes.values()]
+    assert json.loads(page.data["figures"]).keys() == set(shown)
     assert "Only the 3 largest of the 11 clusters" in page.text
     assert "4 clusters more" in page.text
     assert "The 4 nearest of 10 clips" in page.text
@@ -228,36 +244,136 @@ def test_changes_are_those_of_diff(made, some, tmp_path):
     again = {name: name for name in rest} | {
         "walk/renamed.bvh": one,
         two: three,
-        "walk/another.bvh": "jump/x",
+        "walk/another.bvh": some[-1],
     }
-    again["walk/another.bvh"] = some[-1]
     catalog = made(again, folder=tmp_path)
     before = Catalog.open(str(tmp_path / "catalog"), 1)
     changes = diff(before, catalog)
     assert [len(one) for one in (changes.renamed, changes.changed, changes.relabelled)] == [1, 1, 1]
-    page = check(report_page(catalog, before))
-    assert "Since snapshot 000001 of" in page.text
-    for name in ("added", "removed", "renamed", "changed", "moved", "relabelled", "references"):
-        for row in getattr(changes, name).to_pylist():
-            assert all(str(value) in page.text for key, value in row.items() if "digest" not in key)
-    assert "amble" in page.text
-    assert snapshot_before(catalog).snapshot.snapshot_id == "000002"
-    assert "Since snapshot 000003" not in page.text
+    html = report_page(catalog, changes_since(catalog, before))
+    assert "Since snapshot 000001 of" in check(html).text
+    told = html[html.index('<section id="changes">') : html.index('<section id="clusters">')]
+    assert "amble" in told
+    rows = {name: getattr(changes, name).to_pylist() for name in _SHOWN}
+    assert sorted(_table_rows(told)) == sorted(
+        [str(row[column] or "no name") for column in _SHOWN[name]] for name in rows for row in rows[name]
+    )
+    assert "Since snapshot 000002 of" in check(report_page(catalog, changes_since_last(catalog))).text
+
+
+_SHOWN = {
+    "added": ["clip_id"],
+    "removed": ["clip_id"],
+    "renamed": ["clip_id", "previous_clip_id"],
+    "changed": ["clip_id"],
+    "moved": ["clip_id", "previous_cluster_id", "cluster_id"],
+    "relabelled": ["clip_id", "previous_label", "label", "label_source"],
+    "references": ["cluster_id", "previous_clip_id", "clip_id"],
+}
+
+
+def _table_rows(html):
+    """Return the cells of every row of every table, as text."""
+    rows = re.findall("<tr><td.*?</tr>", html)
+    return [[Page(cell).text for cell in re.findall("<td[^>]*>(.*?)</td>", row)] for row in rows]
+
+
+def test_every_kind_of_change_is_shown(publish_rows, tmp_path):
+    def published(clips, clusters, reference):
+        return publish_rows(
+            Store(str(tmp_path)),
+            clips=[{"clip_id": clip, "digest": digest} for clip, digest in clips.items()],
+            clusters=[
+                {"clip_id": clip, "cluster_id": clusters.get(clip, 3), "label": label, "label_source": source}
+                for clip in clips
+                for label, source in [
+                    ("run", "override") if clusters.get(clip) == 5 else (None, "unassigned")
+                ]
+            ],
+            references=[{"cluster_id": 3, "clip_id": reference}],
+            runs=[{"run_id": "a", "settings": "{}"}],
+        )
+
+    published(dict(a="1", b="2", c="3", d="4", f="6"), {"b": 4}, "a")
+    published(dict(a="1", b="2", c2="3", e="5", f="7"), {"b": 5}, "f")
+    after = Catalog.open(str(tmp_path))
+    told = changes_section(after, changes_since_last(after))
+    shown = dict(re.findall("<summary>(.*?)</summary>(.*?)</details>", told, re.DOTALL))
+    assert {title: _table_rows(rows) for title, rows in shown.items()} == {
+        "1 added": [["e"]],
+        "1 removed or set aside": [["d"]],
+        "1 renamed": [["c2", "c"]],
+        "1 changed": [["f"]],
+        "1 moved to another cluster": [["b", "4", "5"]],
+        "1 with another name": [["b", "no name", "run", "override"]],
+        "1 references replaced": [["3", "a", "f"]],
+    }
+
+
+def test_an_earlier_snapshot_that_cannot_be_read_is_said_to_be(publish_rows, motionary, tmp_path):
+    """The part that is damaged is named by the earlier snapshot alone."""
+    store = Store(str(tmp_path / "catalog"))
+    run_row = {"run_id": "a", "settings": "{}"}
+    first = publish_rows(store, clips=[{"clip_id": "one"}], runs=[run_row])
+    publish_rows(store, clips=[], runs=[run_row])
+    part = tmp_path / "catalog" / first.tables["clips"][0]
+    whole = part.read_bytes()
+    part.write_bytes(whole[:-20] + b"no magic")
+    after = Catalog.open(store.url)
+    told = Page(changes_section(after, changes_since_last(after))).text
+    assert "What changed since snapshot 000001" in told
+    assert "cannot be read" in told
+    assert part.name in told
+    with pytest.raises(CatalogError, match=part.name):
+        changes_since(after, Catalog.open(store.url, 1))
+    part.unlink()
+    assert "cannot be read" in changes_section(after, changes_since_last(after))
+    part.write_bytes(whole)
+    assert "1 removed or set aside" in changes_section(after, changes_since_last(after))
+
+
+def test_the_command_passes_over_damage_of_the_snapshot_before(made, some, motionary, tmp_path):
+    made({name: name for name in some[:3]}, folder=tmp_path).close()
+    catalog = made({name: name for name in some[:2]}, folder=tmp_path)
+    before = Catalog.open(catalog.store.url, 1).snapshot
+    for name in ("clips", "clusters"):
+        for file in set(before.tables[name]) - set(catalog.snapshot.tables[name]):
+            (tmp_path / "catalog" / file).write_bytes(b"spoiled")
+    file = tmp_path / "out.html"
+    code, out, _ = motionary("report", catalog.store.url, file, "--json")
+    assert (code, json.loads(out)["against"]) == (0, None)
+    assert "What changed since snapshot 000001" in check(file.read_text()).text
+    code, _, err = motionary("report", catalog.store.url, file, "--overwrite", "--against", "1")
+    assert code == 1
+    assert "damaged" in err
+
+
+def test_the_heading_tells_when_the_snapshot_was_made(demo_catalog, tmp_path):
+    catalog = Catalog.open(shutil.copytree(demo_catalog, tmp_path / "catalog"))
+    clip = catalog.clips.to_arrow()["clip_id"][0].as_py()
+    later = "2031-02-03T04:05:06+00:00"
+    relabel(catalog.store.url, {clip: "amble"}, "a test", lambda dead: None)
+    manifest = tmp_path / "catalog" / "snapshots" / "000002.json"
+    made = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps(made | {"created_at": later}))
+    text = Page(heading(Catalog.open(catalog.store.url))).text
+    assert "Snapshot 000002 of 2031-02-03 04:05 UTC" in text
 
 
 def test_an_unchanged_catalog_says_so(demo):
-    assert "Since snapshot 000001 of" in changes_section(demo, demo)
-    assert ": nothing." in changes_section(demo, demo)
+    text = changes_section(demo, changes_since(demo, demo))
+    assert "Since snapshot 000001 of" in text
+    assert ": nothing." in text
 
 
 def test_a_vacuumed_snapshot_is_missed(made, some, tmp_path):
     first = made({name: name for name in some}, folder=tmp_path)
-    assert "first run" in changes_section(first, snapshot_before(first))
+    assert "first run" in changes_section(first, changes_since_last(first))
     first.close()
     catalog = made({name: name for name in some[1:]}, folder=tmp_path)
     vacuum(Store(str(tmp_path / "catalog")), keep=1, grace_hours=0)
-    assert snapshot_before(catalog) is None
-    page = check(report_page(catalog, None))
+    assert changes_since_last(catalog) is None
+    page = check(report_page(catalog))
     assert "The snapshot before is gone" in page.text
     assert [row["run_id"] in page.text for row in catalog.runs.to_arrow().to_pylist()] == [True, True]
 
@@ -270,7 +386,7 @@ def test_long_lists_of_changes_are_cut(publish_rows, tmp_path):
     publish_rows(store, runs=[run_row])
     publish_rows(store, clips=rows, clusters=members, runs=[run_row])
     before, after = (Catalog.open(str(tmp_path), snapshot) for snapshot in (1, 2))
-    text = Page(changes_section(after, before)).text
+    text = Page(changes_section(after, changes_since(after, before))).text
     assert f"{MOST_ROWS + 50} added" in text
     assert "and 50 more" in text
     assert f"clip {MOST_ROWS - 1:03}" in text
@@ -315,10 +431,23 @@ def test_the_command_replaces_nothing_unasked(made, some, motionary, tmp_path):
     code, out, err = motionary("report", catalog, file)
     assert (code, out, file.read_text()) == (1, "", "mine")
     assert f"{file} is there already" in err
+    relabel(catalog, {some[0]: "amble"}, "a test", lambda dead: None)
     code, out, _ = motionary("report", catalog, file, "--overwrite", "--against", "1")
     assert code == 0
     assert "changes since snapshot 000001" in out
-    assert ": nothing." in file.read_text()
+    assert "1 with another name" in file.read_text()
+
+
+@pytest.mark.parametrize("shown", ["1", "2"])
+def test_the_command_compares_with_an_older_snapshot_only(publish_rows, motionary, tmp_path, shown):
+    store = Store(str(tmp_path / "catalog"))
+    for _ in range(2):
+        publish_rows(store, runs=[{"run_id": "a", "settings": "{}"}])
+    options = ["--snapshot", shown, "--against", "2"]
+    code, out, err = motionary("report", store.url, tmp_path / "out.html", *options)
+    assert (code, out) == (1, "")
+    assert "snapshot 000002 is not older" in " ".join(err.split())
+    assert f"than snapshot 00000{shown}" in " ".join(err.split())
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,7 @@ def _tell(settings: NightlySettings, log: RunLog, report: RunReport) -> None:
         log("report", file=str(file))
     except OSError as error:
         _failed(log, report, f"the report cannot be written: {error}")
-    if settings.html and file and report.exit_code != FAILED:
+    if settings.html and file and report.status == "published":
         _write_page(log, report, file.with_suffix(".html"))
     finish = settings.finish
     if finish.webhook:

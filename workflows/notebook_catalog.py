@@ -18,6 +18,7 @@ from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.distances.tiles import usable_processors
 from motionary.pipeline.synthetic import write_library
 from motionary.workflows.commands.options import COMPILING
+from motionary.workflows.errors import UserError
 from motionary.workflows.main_job import run
 from motionary.workflows.plan import Plan
 from motionary.workflows.preparation import Job
@@ -42,7 +43,7 @@ def catalog_of(place: str | os.PathLike[str] = "") -> Catalog:
     CatalogError
         There is neither a catalog nor a folder.
     UserError
-        The folder is no library.
+        The folder is no library, or what would be its catalog is that of another.
     """
     if not str(place):
         return _demo()
@@ -50,6 +51,7 @@ def catalog_of(place: str | os.PathLike[str] = "") -> Catalog:
     if current_id(Store(url)) is not None or not Path(url).is_dir():
         return Catalog.open(url)
     library = Path(url).resolve()
+    _refuse_anothers(f"{library.name}-catalog", library)
     labels = library / "labels.csv"
     return make_catalog(
         [library],
@@ -104,6 +106,19 @@ def _demo() -> Catalog:
     library = Path(DEMO) / "library"
     write_library(library)
     return make_catalog([library], Path(DEMO) / "catalog", labels=library / "labels.csv")
+
+
+def _refuse_anothers(url: str, library: Path) -> None:
+    """Refuse to run over the catalog of a library that is only called alike."""
+    if current_id(Store(url)) is None:
+        return
+    with Catalog.open(url) as catalog:
+        of = catalog.last_run["library"]
+    if of != [str(library)]:
+        raise UserError(
+            f"{Path(url).resolve()} is the catalog of {', '.join(of)}, not of {library}; "
+            "work in another folder, or give that catalog itself"
+        )
 
 
 def _announcer(job: Job) -> Callable[[Plan], None]:

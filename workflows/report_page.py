@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionary.catalog import Catalog
-from motionary.catalog.views.report.page import report_page, snapshot_before
+from motionary.catalog.views.report.changes import changes_since, changes_since_last
+from motionary.catalog.views.report.page import report_page
 from motionary.pipeline.writers import whole_file
 from motionary.workflows.errors import UserError
 
@@ -23,7 +24,7 @@ class WrittenReport:
     snapshot : str
         What it shows.
     against : str or None
-        The snapshot that it tells the changes since; None where none is left.
+        The snapshot that it tells the changes since; None where none is left that can be read.
     clips, clusters : int
     """
 
@@ -46,14 +47,17 @@ def write_report_page(
     file : Path
         HTML, in a folder that is there.
     before : Catalog, optional
-        Since when changes are told; the newest earlier snapshot that is left, where this is not given.
+        Since when changes are told; the newest earlier snapshot that is left, where this is not given: the
+        page says so if that cannot be read.
     overwrite : bool
         Replace a file that is there.
 
     Raises
     ------
     UserError
-        The file is there already, or its folder is not.
+        The file is there already, or its folder is not; or `before` is not older than what is shown.
+    CatalogError
+        A file of the catalog, or of `before`, is damaged.
     """
     if file.is_dir():
         raise UserError(f"{file} is a folder; name a file in it")
@@ -61,18 +65,30 @@ def write_report_page(
         raise UserError(f"{file} is there already; replace it with --overwrite, or name another file")
     if not file.absolute().parent.is_dir():
         raise UserError(f"there is no folder {file.absolute().parent} to write {file.name} to; make it")
-    earlier = before or snapshot_before(catalog)
-    try:
-        content = report_page(catalog, earlier).encode("utf-8", "replace")
-    finally:
-        if earlier is not None and earlier is not before:
-            earlier.close()
+    if before is not None:
+        _refuse_unless_older(before.snapshot.snapshot_id, catalog.snapshot.snapshot_id)
+    since = changes_since_last(catalog) if before is None else changes_since(catalog, before)
+    content = report_page(catalog, since).encode("utf-8", "replace")
     with whole_file(file) as temporary, temporary.open("wb") as stream:
         stream.write(content)
         stream.flush()
         os.fsync(stream.fileno())
     run = catalog.last_run
-    against = None if earlier is None else earlier.snapshot.snapshot_id
+    against = None
+    if since is not None and not isinstance(since.changes, str):
+        against = since.snapshot.snapshot_id
     return WrittenReport(
-        str(file), len(content), catalog.snapshot.snapshot_id, against, run["clips"], run["clusters"]
+        file=str(file),
+        bytes=len(content),
+        snapshot=catalog.snapshot.snapshot_id,
+        against=against,
+        clips=run["clips"],
+        clusters=run["clusters"],
     )
+
+
+def _refuse_unless_older(against: str, shown: str) -> None:
+    if int(against) >= int(shown):
+        raise UserError(
+            f"snapshot {against} is not older than snapshot {shown}, which is shown: name an earlier one"
+        )

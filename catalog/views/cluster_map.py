@@ -40,13 +40,15 @@ _CHARACTER, _LINE = 6.8, 15.0  # pixels of text
 _AROUND = np.array([(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)])
 
 
-def cluster_map_figure(catalog: Catalog) -> go.Figure:
+def cluster_map_figure(catalog: Catalog, places: NDArray[np.float64] | None = None) -> go.Figure:
     """Draw the map of a library.
 
     Parameters
     ----------
     catalog : Catalog
         An opened catalog; see `library_map` for how long 10,000 clips take.
+    places : array (N, 2), optional
+        Its `map_places`, where they are known already.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def cluster_map_figure(catalog: Catalog) -> go.Figure:
     """
     import plotly.graph_objects as go
 
-    clips = library_map(catalog)
+    clips = library_map(catalog, places)
     rows = clips.to_pylist()
     marks = label_marks(clips["label"].to_pylist())
     shapes = source_shapes(clips["source"].to_pylist())
@@ -224,13 +226,13 @@ def _arrange(figure: go.Figure, clips: pa.Table) -> None:
     height = np.clip((high - low)[1] * _pixels(places), _LEAST_HEIGHT, _MOST_HEIGHT)
     figure.update_layout(
         **CHART,
-        height=70 + max(float(height.round()), legend),
-        margin={"l": 10, "r": 10, "t": 20, "b": 40},
+        height=90 + max(float(height.round()), legend),
+        margin={"l": 10, "r": 10, "t": 20, "b": 60},
         legend={"itemsizing": "constant", "tracegroupgap": 0},
         clickmode="event",
         hovermode="closest",
     )
-    title = "neighbours are alike; how far apart groups lie means nothing" if len(clips) else ""
+    title = "neighbours are alike;<br>how far apart groups lie means nothing" if len(clips) else ""
     hidden = {**AXIS, "showticklabels": False, "showgrid": False, "showline": False}
     figure.update_xaxes(**hidden, title=title, range=[low[0], high[0]])
     figure.update_yaxes(**hidden, range=[low[1], high[1]], scaleanchor="x")

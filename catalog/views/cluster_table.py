@@ -1,14 +1,16 @@
-"""The published clusters, a row each."""
+"""The published clusters, a row each, and the clips in them."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from motionary.catalog.query import Catalog
+from motionary.pipeline.clustering import OWN_LABEL_SOURCES
 from motionary.pipeline.evaluation import purity
 
 
@@ -44,8 +46,17 @@ def cluster_table(catalog: Catalog) -> pa.Table:
     )
 
 
+def cluster_members(catalog: Catalog) -> dict[int, list[dict[str, Any]]]:
+    """List the clips of every cluster: rows of `clusters`, the reference first, then the nearest to it."""
+    order = [("is_reference", "descending"), ("distance_to_reference", "ascending"), ("clip_id", "ascending")]
+    members: dict[int, list[dict[str, Any]]] = {}
+    for clip in catalog.clusters.to_arrow().sort_by(order).to_pylist():
+        members.setdefault(clip["cluster_id"], []).append(clip)
+    return members
+
+
 def _own_labels(clusters: pa.Table) -> pa.ChunkedArray:
-    own = pc.is_in(clusters["label_source"], pa.array(["override", "supplied"]))
+    own = pc.is_in(clusters["label_source"], pa.array(OWN_LABEL_SOURCES))
     return pc.if_else(own, clusters["label"], None)
 
 

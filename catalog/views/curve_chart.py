@@ -9,7 +9,7 @@ are made of one: the fuzzy distance, from its least to its greatest value [DC eq
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motionary.catalog.explanation import Explanation
 from motionary.catalog.views.chart_text import full_text, short_text
@@ -107,47 +107,40 @@ def _band(number: int, one: Explanation) -> list[go.Scatter]:
 
 
 def _arrange(figure: go.Figure, explanations: Sequence[Explanation]) -> None:
-    thresholds = [point.threshold for point in explanations[0].curve]
-    greatest = max(max(one.distances.values()) for one in explanations)
     figure.update_layout(
         **CHART,
         height=430 + 34 * len(explanations),
         margin={"l": 60, "r": 20, "t": 30, "b": 60},
         legend={"orientation": "h", "y": -0.2, "yanchor": "top"},
-        annotations=[
-            {
-                "text": "fuzzy band, weighted marked",
-                "xref": "x2 domain",
-                "yref": "paper",
-                "x": 0.5,
-                "y": 1,
-                "yanchor": "bottom",
-                "showarrow": False,
-            }
-        ],
     )
-    figure.update_layout(
-        xaxis={
-            **AXIS,
-            "title": "threshold λ",
-            "domain": [0, 0.74],
-            "range": [min(0.3, *thresholds), 1.02],
-            "tickvals": thresholds,
-            "tickformat": ".2~f",
-            "showline": True,
-        },
-        xaxis2={
-            **AXIS,
-            "title": "pair",
-            "domain": [0.78, 1],
-            "type": "category",
-            "range": [-0.7, len(explanations) - 0.3],
-            "showline": True,
-        },
-        yaxis={
-            **AXIS,
-            "title": "S-DTW (about leg lengths)",
-            "range": [0, 1.08 * greatest or 1],
-            "showline": True,
-        },
+    figure.add_annotation(
+        text="fuzzy band, weighted marked",
+        xref="x2 domain",
+        yref="paper",
+        x=0.5,
+        y=1,
+        yanchor="bottom",
+        showarrow=False,
     )
+    figure.update_layout(_axes(explanations))
+
+
+def _axes(explanations: Sequence[Explanation]) -> dict[str, Any]:
+    thresholds = [point.threshold for point in explanations[0].curve]
+    greatest = max(max(one.distances.values()) for one in explanations)
+    along = {
+        "title": "threshold λ",
+        "domain": [0, 0.74],
+        "range": [min(0.3, *thresholds), 1.02],
+        "tickvals": thresholds,
+        "tickformat": ".2~f",
+    }
+    pairs = {
+        "title": "pair",
+        "domain": [0.78, 1],
+        "type": "category",
+        "range": [-0.7, len(explanations) - 0.3],
+    }
+    upwards = {"title": "S-DTW (about leg lengths)", "range": [0, 1.08 * greatest or 1]}
+    axes: dict[str, dict[str, Any]] = {"xaxis": along, "xaxis2": pairs, "yaxis": upwards}
+    return {name: {**AXIS, **axis, "showline": True} for name, axis in axes.items()}

@@ -32,6 +32,8 @@ and the furthest place of all lies at 1.
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,6 +42,8 @@ NEIGHBOURS = 3
 
 _PERPLEXITY = 30.0
 _FEWEST = 8  # clips that have neighbourhoods to keep; of fewer the start is as good
+_ALONE = Lock()
+"""The limit on threads is the process's: of two that overlap, the second would put back the first one's."""
 
 
 def laid_out(distances: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -61,7 +65,7 @@ def laid_out(distances: NDArray[np.floating]) -> NDArray[np.float64]:
     distances = np.asarray(distances, dtype=np.float64)
     if not distances.any():
         return np.zeros((len(distances), 2))
-    with threadpool_limits(limits=1):
+    with _ALONE, threadpool_limits(limits=1):
         places = _with_signs(_scaled(distances))
         if len(distances) < _FEWEST:
             return places

@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 from motionary.pipeline.canonical import (
     CANONICAL_JOINTS,
     Convention,
+    SkeletonError,
     UnknownSkeletonError,
     canonical_indices,
     find_convention,
 )
-from motionary.pipeline.motion import FloatArray, Skeleton
+from motionary.pipeline.motion import FloatArray, Motion, Skeleton
 from motionary.pipeline.normalise import headings
-
-_STANDING = 0.028  # leg lengths over the floor, 2.5 cm, as `motionary.pipeline.style.contact` has it
-_STILL = 0.6  # leg lengths a second
+from motionary.pipeline.style.contact import standing_toes
 
 
 def body_size(skeleton: Skeleton) -> float:
@@ -43,22 +42,9 @@ def first_heading(places: FloatArray, body: Mapping[str, int]) -> float:
     return float(headings(places[:, [*body.values()]])[0]) if body else 0.0
 
 
-def kept_joints(skeleton: Skeleton, joints: Sequence[str] | None) -> list[int]:
-    """Return the indices of the joints named, in the skeleton's order; all of them for None."""
-    if joints is None:
-        return [*range(len(skeleton.names))]
+def kept_joints(skeleton: Skeleton, joints: Sequence[str]) -> list[int]:
+    """Return the indices of the joints named, in the skeleton's order."""
     return sorted({skeleton.index(name) for name in joints})
-
-
-def hung_parents(skeleton: Skeleton, place_of: Mapping[int, int]) -> tuple[int, ...]:
-    """Hang each kept joint from the nearest kept one above it."""
-    parents = []
-    for joint in place_of:
-        above = skeleton.parents[joint]
-        while above != -1 and above not in place_of:
-            above = skeleton.parents[above]
-        parents.append(place_of.get(above, -1))
-    return tuple(parents)
 
 
 def joints_between(skeleton: Skeleton, body: Mapping[str, int]) -> list[str]:
@@ -73,21 +59,20 @@ def joints_between(skeleton: Skeleton, body: Mapping[str, int]) -> list[str]:
 
 
 def contacts_of(
-    places: FloatArray, body: Mapping[str, int], fps: float
-) -> list[tuple[int, NDArray[np.bool_]]]:
-    """Find when each toe stands: as low as `foot_sliding` counts it, and nearly still."""
-    if not body or len(places) < 2:
-        return []
-    leg = np.mean(
-        [
-            np.linalg.norm(places[:, body[f"{side}_{upper}"]] - places[:, body[f"{side}_{lower}"]], axis=-1)
-            for side in ("left", "right")
-            for upper, lower in (("hip", "knee"), ("knee", "ankle"))
-        ]
-    )
-    toes = [body["left_toe"], body["right_toe"]]
-    height = places[:, toes, 1]
-    floor = np.percentile(height.min(axis=1), 2)
-    speed = np.linalg.norm(np.gradient(places[:, toes], 1 / fps, axis=0), axis=-1)
-    on = (height <= floor + _STANDING * 2 * leg) & (speed <= _STILL * 2 * leg)
-    return [(toe, on[:, side]) for side, toe in enumerate(toes)]
+    motion: Motion, body: Mapping[str, int], conventions: Sequence[Convention]
+) -> dict[int, NDArray[np.bool_]]:
+    """Return when each toe stands (T,); nothing of a figure without legs, or that no convention fits."""
+    try:
+        stands = standing_toes(motion, conventions)
+    except SkeletonError:
+        return {}
+    return {body["left_toe"]: stands[:, 0], body["right_toe"]: stands[:, 1]}
+
+
+def by_joint(canonical: FloatArray, skeleton: Skeleton, body: Mapping[str, int]) -> FloatArray:
+    """Give joints the columns of canonical ones (m, 19); others have that of the joint above them (m, J)."""
+    column = {joint: place for place, joint in enumerate(body.values())}
+    columns: list[int] = []
+    for joint, parent in enumerate(skeleton.parents):
+        columns.append(column.get(joint, columns[parent] if parent >= 0 else 0))
+    return canonical[:, columns]

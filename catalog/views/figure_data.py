@@ -9,14 +9,17 @@ rival, 16-bit values as they are, takes twice as much.
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.motion import FloatArray
+
+_QUANTUM = 2e-4  # of the body's size
+_LARGEST = 32767
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,8 @@ class Figure:
         J indices, -1 for the root, smaller than the joint's own index.
     fps : float
         Frames a second.
+    source_fps : float
+        Those of the file, which the player counts in.
     values : array (T, J, 3) int16
         Places: `origin + scale * values`, source units, Y up.
     scale : float
@@ -52,8 +57,10 @@ class Figure:
         Frames a second of those.
     reference : str, optional
         What it is aligned to.
-    residual : array (m, J), optional
-        How far each joint is from the reference's in its time, leg lengths.
+    residual : array (m, J) uint8, optional
+        How far each joint is from the reference's in its time, 255 for `residual_max`.
+    residual_max : float
+        The most that it reaches, leg lengths.
     contacts : mapping of int to array (T,) bool
         For joints that may stand on the floor, whether they do.
     """
@@ -62,6 +69,7 @@ class Figure:
     joints: tuple[str, ...]
     parents: tuple[int, ...]
     fps: float
+    source_fps: float
     values: NDArray[np.int16]
     scale: float
     origin: FloatArray
@@ -74,7 +82,8 @@ class Figure:
     warp_times: FloatArray | None = None
     warp_fps: float = 30.0
     reference: str | None = None
-    residual: FloatArray | None = None
+    residual: NDArray[np.uint8] | None = None
+    residual_max: float = 0.0
     contacts: Mapping[int, NDArray[np.bool_]] = field(default_factory=dict)
 
     @property
@@ -91,6 +100,19 @@ class Figure:
         """Return the places (T, J, 3) as the player shows them, source units."""
         return self.origin + self.scale * self.values
 
+    def only(self, kept: Sequence[int]) -> Figure:
+        """Return the figure with some joints, ascending; each hangs from the nearest kept one above it."""
+        place_of = {joint: place for place, joint in enumerate(kept)}
+        return replace(
+            self,
+            joints=tuple(self.joints[joint] for joint in kept),
+            parents=_hung(self.parents, place_of),
+            values=self.values[:, kept],
+            body={name: place_of[joint] for name, joint in self.body.items() if joint in place_of},
+            residual=None if self.residual is None else self.residual[:, kept],
+            contacts={place_of[joint]: on for joint, on in self.contacts.items() if joint in place_of},
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as the player's JSON."""
         return {
@@ -98,6 +120,7 @@ class Figure:
             "clip_id": self.clip_id,
             "label": self.label,
             "fps": self.fps,
+            "source_fps": self.source_fps,
             "frames": self.frames,
             "seconds": self.seconds,
             "joints": list(self.joints),
@@ -119,10 +142,12 @@ class Figure:
             times = _text(self.warp_times.astype("<f4"))
             made["warp"] = {"fps": self.warp_fps, "reference": self.reference, "times": times}
         if self.residual is not None:
-            most = float(self.residual.max(initial=0.0))
-            shares = np.rint(self.residual * (255 / (most or 1.0))).astype(np.uint8)
-            different, column = np.unique(shares, axis=1, return_inverse=True)  # fingers have their hand's
-            made["residual"] = {"max": most, "column": column.tolist(), "values": _text(different)}
+            different, column = np.unique(self.residual, axis=1, return_inverse=True)  # fingers: their hand's
+            made["residual"] = {
+                "max": self.residual_max,
+                "column": column.tolist(),
+                "values": _text(different),
+            }
         return made
 
     def _contact_dict(self) -> dict[str, Any]:
@@ -130,6 +155,20 @@ class Figure:
             return {}
         bits = np.packbits(np.stack([*self.contacts.values()], axis=1), axis=None, bitorder="little")
         return {"contacts": {"joints": [*self.contacts], "bits": _text(bits)}}
+
+
+def quantised(places: FloatArray, size: float) -> tuple[NDArray[np.int16], float, FloatArray]:
+    """Return places (T, J, 3) as whole numbers, their scale and their origin; `size` is the body's."""
+    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    scale = max(size * _QUANTUM, float((high - low).max()) / (2 * _LARGEST))
+    origin = low + (high - low) / 2
+    return np.rint((places - origin) / scale).astype(np.int16), scale, origin
+
+
+def shares(residual: FloatArray) -> tuple[NDArray[np.uint8], float]:
+    """Return a residual (m, J) as shares of 255, and the most that it reaches."""
+    most = float(residual.max(initial=0.0))
+    return np.rint(residual * (255 / (most or 1.0))).astype(np.uint8), most
 
 
 def packed(values: NDArray[np.int16]) -> NDArray[np.uint8]:
@@ -150,6 +189,16 @@ def packed(values: NDArray[np.int16]) -> NDArray[np.uint8]:
     for byte in range(4):
         stream[start[:-1][wide] + 1 + byte] = (flat[wide] >> (8 * byte)) & 255
     return stream
+
+
+def _hung(parents: Sequence[int], place_of: Mapping[int, int]) -> tuple[int, ...]:
+    found = []
+    for joint in place_of:
+        above = parents[joint]
+        while above != -1 and above not in place_of:
+            above = parents[above]
+        found.append(place_of.get(above, -1))
+    return tuple(found)
 
 
 def _text(array: NDArray) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,25 +12,24 @@ from motionary.catalog.motions import stream_features, stream_motions
 from motionary.catalog.places import rows_by_clip
 from motionary.catalog.views.figure_body import (
     body_size,
+    by_joint,
     canonical_body,
     contacts_of,
     first_heading,
-    hung_parents,
     joints_between,
     kept_joints,
 )
-from motionary.catalog.views.figure_data import Figure
+from motionary.catalog.views.figure_data import Figure, quantised, shares
 from motionary.pipeline.alignment.warp import Warp
-from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention
-from motionary.pipeline.features import POSE_COLUMNS, sample_times
-from motionary.pipeline.motion import FloatArray, Motion, Skeleton
+from motionary.pipeline.canonical import Convention
+from motionary.pipeline.features import at_rate
+from motionary.pipeline.motion import FloatArray, Motion
+from motionary.pipeline.style.residual import pose_differences
 
 if TYPE_CHECKING:
     from motionary.catalog.query import Catalog
 
 _RATE = 30.0
-_QUANTUM = 2e-4  # of the body's size
-_LARGEST = 32767
 _WARP = ["reference_id", "frame_rate", "source_time"]
 
 Layout = Literal["side", "overlaid"]
@@ -80,38 +79,16 @@ def figure_of(
     KeyError
         The motion has no joint of that name.
     """
-    if residual is not None and (
-        warp is None or residual.shape != (warp.reference_frames, len(motion.skeleton.names))
-    ):
-        wanted = None if warp is None else (warp.reference_frames, len(motion.skeleton.names))
-        raise ValueError(f"residual has shape {residual.shape}; it needs a warp, and with this one {wanted}")
-    fps = min(rate, _whole(motion.fps))
-    shown = motion.sampled(sample_times(motion.frames, motion.fps, fps))
-    places = shown.positions()
-    body = canonical_body(motion.skeleton, conventions)
-    size = body_size(motion.skeleton) or float(np.ptp(places, axis=(0, 1)).max()) or 1.0
-    kept = kept_joints(motion.skeleton, joints)
-    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    scale = max(size * _QUANTUM, float((high - low).max()) / (2 * _LARGEST))
-    origin = low + (high - low) / 2
-    place_of = {joint: place for place, joint in enumerate(kept)}
-    return Figure(
-        name=motion.name if name is None else name,
-        joints=tuple(motion.skeleton.names[joint] for joint in kept),
-        parents=hung_parents(motion.skeleton, place_of),
-        fps=float(fps),
-        values=np.rint((places[:, kept] - origin) / scale).astype(np.int16),
-        scale=scale,
-        origin=origin,
-        size=size,
-        turn=first_heading(places, body),
-        floor=float(low[1]),
-        body={name: place_of[joint] for name, joint in body.items() if joint in place_of},
-        warp_times=None if warp is None else warp.source_time / warp_rate,
-        warp_fps=float(warp_rate),
-        residual=None if residual is None else residual[:, kept],
-        contacts={place_of[joint]: on for joint, on in contacts_of(places, body, fps) if joint in place_of},
-    )
+    _check(residual, warp, motion)
+    figure = _plain_figure(motion, rate, conventions)
+    if name is not None:
+        figure = replace(figure, name=name)
+    if warp is not None:
+        figure = replace(figure, warp_times=warp.source_time / warp_rate, warp_fps=float(warp_rate))
+    if residual is not None:
+        values, most = shares(residual)
+        figure = replace(figure, residual=values, residual_max=most)
+    return figure if joints is None else figure.only(kept_joints(motion.skeleton, joints))
 
 
 def clip_figure(catalog: Catalog, clip_id: str, *, slim: bool = False) -> Figure:
@@ -153,11 +130,12 @@ def clip_figures(catalog: Catalog, clip_ids: Collection[str], *, slim: bool = Fa
         reference = alignment["reference_id"]
         body = canonical_body(motion.skeleton, conventions)
         warp = Warp(np.array(alignment["source_time"]), len(features[clip_id]))
+        differences = pose_differences(warp.apply(features[clip_id]), features[reference])
         figure = figure_of(
             motion,
             warp=warp,
             warp_rate=alignment["frame_rate"],
-            residual=_residual(warp, features[clip_id], features[reference], motion.skeleton, body),
+            residual=by_joint(np.linalg.norm(differences, axis=2), motion.skeleton, body) if body else None,
             joints=joints_between(motion.skeleton, body) if slim and body else None,
             conventions=conventions,
         )
@@ -208,22 +186,38 @@ def scene(
     }
 
 
+def _check(residual: FloatArray | None, warp: Warp | None, motion: Motion) -> None:
+    if residual is None:
+        return
+    wanted = None if warp is None else (warp.reference_frames, len(motion.skeleton.names))
+    if residual.shape != wanted:
+        raise ValueError(f"residual has shape {residual.shape}; it needs a warp, and with this one {wanted}")
+
+
+def _plain_figure(motion: Motion, rate: float, conventions: Sequence[Convention]) -> Figure:
+    """Make a figure of all joints, in its own time."""
+    shown = at_rate(motion, min(rate, _whole(motion.fps)))
+    places = shown.positions()
+    body = canonical_body(motion.skeleton, conventions)
+    size = body_size(motion.skeleton) or float(np.ptp(places, axis=(0, 1)).max()) or 1.0
+    values, scale, origin = quantised(places, size)
+    return Figure(
+        name=motion.name,
+        joints=motion.skeleton.names,
+        parents=motion.skeleton.parents,
+        fps=shown.fps,
+        source_fps=motion.fps,
+        values=values,
+        scale=scale,
+        origin=origin,
+        size=size,
+        turn=first_heading(places, body),
+        floor=float(places[..., 1].min()),
+        body=body,
+        contacts=contacts_of(shown, body, conventions),
+    )
+
+
 def _whole(fps: float) -> float:
     nearest = round(fps)
     return nearest if nearest and abs(fps - nearest) <= 1e-3 * nearest else fps
-
-
-def _residual(
-    warp: Warp, own: FloatArray, reference: FloatArray, skeleton: Skeleton, body: Mapping[str, int]
-) -> FloatArray | None:
-    """Return how far the joints are from the reference's (m, J); others have that of the joint above them."""
-    if not body:
-        return None
-    difference = warp.apply(own[:, :POSE_COLUMNS]) - reference[:, :POSE_COLUMNS]
-    root = np.sqrt(len(CANONICAL_JOINTS))
-    distance = root * np.linalg.norm(difference.reshape(len(difference), -1, 3), axis=-1)
-    column = {joint: place for place, joint in enumerate(body.values())}
-    columns: list[int] = []
-    for joint, parent in enumerate(skeleton.parents):
-        columns.append(column.get(joint, columns[parent] if parent >= 0 else 0))
-    return distance[:, columns]

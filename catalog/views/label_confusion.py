@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.chart_text import short_text
 from motionary.catalog.views.colours import AXIS, CHART
+from motionary.pipeline.clustering import OWN_LABEL_SOURCES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -29,7 +30,7 @@ _WITH_SHARES = 14  # columns at most: more leave no room for the share under the
 _COUNTS = """
 select c.label, c.cluster_id, r.label as name, count(*) as clips
 from clusters c join "references" r using (cluster_id)
-where c.label_source in ('override', 'supplied') group by all
+where list_contains($own, c.label_source) group by all
 """
 
 
@@ -93,7 +94,7 @@ def confusion_figure(catalog: Catalog) -> go.Figure | None:
 
 def label_counts(catalog: Catalog) -> LabelCounts | None:
     """Count the clips with a label of their own by label and cluster; None where there are none."""
-    found = catalog.sql(_COUNTS).to_pylist()
+    found = catalog.sql(_COUNTS, {"own": list(OWN_LABEL_SOURCES)}).to_pylist()
     if not found:
         return None
     names = {row["cluster_id"]: row["name"] for row in found}

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.catalog.query import Catalog
-from motionary.catalog.views.colours import AXIS, CHART, COLOURS, GREY
+from motionary.catalog.views.colours import AXIS, CHART, GREY
+from motionary.catalog.views.line_styles import line_style
 from motionary.catalog.views.linkages import linkages_by_distance
 from motionary.catalog.views.threshold_band import band_trace, strip_bars
 from motionary.pipeline.clustering import threshold_strips
@@ -20,7 +21,6 @@ from motionary.pipeline.clustering import threshold_strips
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-_DASHES = ("solid", "dash", "dot", "dashdot")
 _LAST_MU = 1.05
 _ROW_PIXELS = 26
 _CURVE_PIXELS = 370
@@ -49,7 +49,8 @@ def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
     if not curves:
         return None
     figure = go.Figure()
-    for one, colour, dash in zip(curves, COLOURS, _DASHES, strict=False):
+    for number, one in enumerate(curves, start=1):
+        style = line_style(number)
         metric, unit = one.cut["metric"], one.Z[-1, 2] or 1.0
         mu, kappa = steps(one.Z)
         figure.add_scatter(
@@ -58,11 +59,11 @@ def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
             name=f"{metric} ({one.cut['method']})",
             legendgroup=metric,
             mode="lines",
-            line={"color": colour, "dash": dash, "width": 2, "shape": "hv"},
+            line={"color": style.colour, "dash": style.dash, "width": 2, "shape": "hv"},
             hovertemplate=f"{metric}: %{{y}} clusters from μ = %{{x:.3f}}<extra></extra>",
         )
         bars = strip_bars(one.Z, _LAST_MU * unit)
-        figure.add_trace(band_trace(bars, metric, unit, colour, yaxis="y2", legendgroup=metric))
+        figure.add_trace(band_trace(bars, metric, unit, style.colour, yaxis="y2", legendgroup=metric))
     published = len(catalog.references)
     figure.add_scatter(
         x=[0, _LAST_MU],

@@ -3,6 +3,10 @@
 //
 // World: right-handed, Y up, a figure facing +Z has its left at +X, as everywhere in motionary. Figures are drawn at
 // one size (the longest chain of bones is 1), stand on the floor, and begin at their own place facing the viewer.
+//
+// In reading order: createPlayer, mountAll and anywidget's entry; then, each below a ruler, the player; the one loop;
+// figures (which moment is shown, and where its joints are); what is offered; the camera; drawing; colours; pointer
+// and keyboard; controls, with the template.
 
 /**
  * Build a player of a scene in an element; the answer is its handle: play(), pause(), seek(seconds), step(frames),
@@ -74,6 +78,8 @@ export default {
   },
 };
 
+// ---- the player: settings, the clock, what holds the figures
+
 class Player {
   constructor(element, options) {
     this.options = options;
@@ -110,9 +116,11 @@ class Player {
     this.allow();
     Object.assign(this.settings, { follow: false, inPlace: false });
     this.arrange();
-    const followed = this.room(true).footprint;
-    if (followed > WIDEST) this.set({ inPlace: true }); // figures that go apart would all be small
-    else this.set(this.box.footprint > 1.6 * followed ? { follow: true } : {});
+    const going = this.box.footprint;
+    this.set({ inPlace: true });
+    // Of one that goes far the camera goes along; several would part, or run into each other.
+    const far = going > 1.6 * this.box.footprint;
+    if (!far || this.figures.length === 1) this.set({ inPlace: false, follow: far });
   }
 
   play() {
@@ -138,12 +146,15 @@ class Player {
   }
 
   set(changes) {
-    const share = this.duration ? this.time / this.duration : 0;
+    const { aligned } = this.settings;
+    const warped = this.figures.find(isWarped);
+    const own = warped?.ownTime(this.time, aligned);
     Object.assign(this.settings, changes);
     this.allow();
     if ("view" in changes) this.camera.look(changes.view);
     if (["layout", "aligned", "follow", "inPlace", "view"].some((key) => key in changes)) this.arrange();
-    if ("aligned" in changes) this.time = share * this.duration;
+    // The pose stays: what is compared is that moment in the other time, not another one.
+    if (this.settings.aligned !== aligned) this.time = warped.clockTime(own, !aligned);
     this.changed();
   }
 
@@ -347,17 +358,25 @@ class Figure {
     return Math.min(own, this.seconds);
   }
 
-  /** The frame of the reference at a time of the player's clock, or the first that shows this motion at its own. */
+  /** The reverse: the first time of the player's clock that shows this motion nearest to its own seconds. */
+  clockTime(own, aligned) {
+    if (!aligned || !this.times) return own;
+    const { times } = this;
+    let [place, least] = [0, Infinity];
+    for (let k = 0; k < times.length; k++) {
+      const step = k + 1 < times.length ? times[k + 1] - times[k] : 0; // below 0 where it plays backwards
+      const share = step ? Math.min(Math.max((own - times[k]) / step, 0), 1) : 0;
+      const off = Math.abs(times[k] + share * step - own);
+      if (off < least) [place, least] = [k + share, off];
+    }
+    return place / this.warp.fps;
+  }
+
+  /** The frame of the reference at a time of the player's clock, which in its own time shows `own`. */
   referenceFrame(time, own, aligned) {
     if (!this.times) return 0;
-    let [low, high] = [0, this.times.length - 1];
-    if (aligned) return Math.min(Math.round(time * this.warp.fps), high);
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.times[middle] < own) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+    const clock = aligned ? time : this.clockTime(own, true);
+    return Math.min(Math.round(clock * this.warp.fps), this.times.length - 1);
   }
 
   // The values from the k-th to the m-th between two frames; a whole frame's as they are.
@@ -484,7 +503,7 @@ function bytesOf(text) {
   return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 }
 
-// The reverse of `packed` in figures.py: second differences in time, one byte each or -128 and then four.
+// The reverse of `packed` in figure_data.py: second differences in time, one byte each or -128 and then four.
 function unpacked(stream, frames, width) {
   const values = new Int16Array(frames * width);
   const view = new DataView(stream.buffer);
@@ -514,14 +533,28 @@ function hottestOf(figures) {
   return Math.max(0, ...counts) || 1;
 }
 
+// ---- what is offered
+
+// Whether its alignment changes its time; that of a reference to itself does not.
+function isWarped({ warp, clip_id }) {
+  return Boolean(warp) && (clip_id === null || warp.reference !== clip_id);
+}
+
+// Whether all of them have a place in the time of one reference: by a warp to it, or by being it.
+function alignable(figures) {
+  const warped = figures.find(isWarped);
+  if (!warped) return false;
+  const { reference } = warped.warp;
+  const is = ({ clip_id }) => clip_id !== null && clip_id === reference;
+  return figures.every((one) => (one.warp ? one.warp.reference === reference : is(one)));
+}
+
 // Which settings make sense for these figures.
 function offered(figures) {
-  // A reference alone runs in its own time already.
-  const warped = figures.filter((one) => one.warp && (figures.length > 1 || !one.clip_id || one.warp.reference !== one.clip_id));
   return {
     time: figures.some((one) => one.frames > 1),
     overlaid: figures.length > 1,
-    aligned: warped.length > 0 && new Set(warped.map((one) => one.warp.reference)).size === 1,
+    aligned: alignable(figures),
     residual: figures.some((one) => one.heat && one.times && one.residual.max > 0),
     contacts: figures.some((one) => one.stands),
     trails: figures.some((one) => TRAILS.hips[0] in one.body),
@@ -530,7 +563,6 @@ function offered(figures) {
 
 // ---- the camera
 
-const WIDEST = 4; // body sizes that figures may be apart while the camera follows them
 const VIEWS = { front: [0.4, 0.2], side: [Math.PI / 2, 0.1], top: [0, 1.5] }; // yaw and pitch
 const FIELD = Math.tan((14 * Math.PI) / 180); // of half the angle of view
 
@@ -961,6 +993,11 @@ function pressed(player, event) {
   const { tagName } = event.target;
   if (event.ctrlKey || event.metaKey || event.altKey || tagName === "SELECT") return;
   if (tagName === "BUTTON" && (event.key === " " || event.key === "Enter")) return;
+  if (event.key === "Escape" && player.controls.helping) {
+    event.preventDefault();
+    event.stopPropagation();
+    return player.controls.help();
+  }
   const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (!act) return;
   event.preventDefault();
@@ -1005,6 +1042,7 @@ const TRAILS = {
 class Controls {
   constructor(player) {
     this.player = player;
+    this.frames = [];
     this.part = (name) => player.root.querySelector(`[data-part="${name}"]`);
     const click = (name, act) => this.part(name).addEventListener("click", () => act(player));
     click("play", KEYS[" "]);
@@ -1030,6 +1068,7 @@ class Controls {
     this.part("trails").parentElement.hidden = !offer.trails || !offer.time;
     this.part("hottest").textContent = `${hottest.toFixed(2)} leg lengths, or more`;
     this.part("legend").replaceChildren(...figures.map(legendOf));
+    this.frames = [...this.part("legend").querySelectorAll(".frame")];
     const names = figures.map((one) => one.name).join("; ");
     root.querySelector(".player").setAttribute("aria-label", `Motion player: ${names}`);
     canvas.setAttribute("aria-label", `${figures.length === 1 ? "Figure" : "Figures"} of ${names}; press ? for keys`);
@@ -1037,7 +1076,7 @@ class Controls {
   }
 
   update() {
-    const { playing, time, duration, settings, rate, host } = this.player;
+    const { playing, time, duration, settings, rate, host, figures } = this.player;
     this.part("play").setAttribute("aria-label", playing ? "Pause" : "Play");
     this.part("play").classList.toggle("playing", playing);
     const bar = this.part("time");
@@ -1047,6 +1086,11 @@ class Controls {
     bar.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${duration.toFixed(2)} seconds`);
     bar.style.setProperty("--done", `${duration ? (100 * time) / duration : 0}%`);
     this.part("clock").textContent = `${time.toFixed(2)} / ${duration.toFixed(2)} s`;
+    this.frames.forEach((place, index) => {
+      const one = figures[index]; // frames of the file, from 0, as in the catalog's tables
+      const frame = Math.round(one.ownTime(time, settings.aligned) * one.source_fps);
+      place.textContent = `frame ${frame} at ${Number(one.source_fps.toFixed(2))}/s`;
+    });
     const press = (name, on) => this.part(name).setAttribute("aria-pressed", String(on));
     for (const name of ["aligned", "contacts", "inPlace", "follow", "loop"]) press(name, settings[name]);
     press("overlaid", settings.layout === "overlaid");
@@ -1060,9 +1104,13 @@ class Controls {
     host.dataset.playing = playing;
   }
 
+  get helping() {
+    return !this.part("keys").hidden;
+  }
+
   help() {
-    const shown = this.part("keys").toggleAttribute("hidden");
-    this.part("help").setAttribute("aria-expanded", String(!shown));
+    this.part("keys").toggleAttribute("hidden");
+    this.part("help").setAttribute("aria-expanded", String(this.helping));
   }
 }
 
@@ -1073,13 +1121,14 @@ const SHAPES = [
   '<path d="M8 1.5 15 14 1 14Z"/>',
 ];
 
-function legendOf({ name, label, seconds, index }) {
+function legendOf({ name, clip_id, label, seconds, index }, _, figures) {
   const item = document.createElement("li");
+  const held = clip_id && figures.some((one) => one.clip_id !== clip_id && one.warp?.reference === clip_id);
   const colour = COLOURS[index % COLOURS.length];
   const fill = index % 2 ? `fill="${colour}" fill-opacity=".25"` : `fill="${colour}"`;
   item.innerHTML = `<svg viewBox="0 0 16 16" aria-hidden="true" ${fill} stroke="${colour}" stroke-width="2">${
     SHAPES[index % SHAPES.length]
-  }</svg><bdi class="name"></bdi><bdi></bdi><span>${seconds.toFixed(1)} s</span>`;
+  }</svg><bdi class="name"></bdi><bdi></bdi><span>${held ? "reference, " : ""}${seconds.toFixed(1)} s</span><span class="frame" aria-hidden="true"></span>`;
   const [named, labelled] = item.querySelectorAll("bdi");
   named.textContent = item.title = name;
   labelled.textContent = label ?? "";
@@ -1118,6 +1167,7 @@ li svg { width: 11px; height: 11px; flex: none; align-self: center; }
 li :is(bdi, span) { color: var(--quiet, inherit); white-space: nowrap; }
 li bdi { overflow: hidden; text-overflow: ellipsis; min-width: 0; }
 li .name { color: inherit; min-width: 6rem; }
+li .frame { min-width: 7.5rem; font-variant-numeric: tabular-nums; }
 .scale { padding: 6px 10px 0; display: flex; gap: 6px; align-items: center; }
 .scale i { width: 110px; height: 9px; border-radius: 4px; border: 1px solid var(--edge);
   background: linear-gradient(90deg, var(--cool), var(--hot)); }
@@ -1151,7 +1201,7 @@ ${toggle("follow", "Follow", "The camera goes with them (f)")}
 ${toggle("loop", "Loop", "Begin again at the end (l)")}
 <label>Trails <select data-part="trails"><option value="none">none</option><option value="hands">hands</option>
 <option value="feet">feet</option><option value="both">hands and feet</option><option value="hips">hips</option>
-<option value="head">head</option><option value="given" hidden>chosen</option></select></label>
+<option value="head">head</option><option value="given" hidden disabled>chosen</option></select></label>
 <label>Speed <select data-part="speed">${SPEEDS.map((one) => option([one, `${one}×`])).join("")}</select></label>
 <label>View <select data-part="view">${["front", "side", "top", "free"].map((one) => option([one, one])).join("")}</select></label>
 </div>

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from datetime import UTC, datetime
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.colours import cluster_character, cluster_colour
 from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES
 from motionary.catalog.views.page import Cell, Html, facts, isolated, section, table
 from motionary.catalog.views.scores import score_columns, score_note, score_row
+from motionary.pipeline.clustering import OWN_LABEL_SOURCES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -33,18 +35,74 @@ def heading(catalog: Catalog) -> str:
         [
             ("clips", run["clips"]),
             ("clusters", run["clusters"]),
-            ("with a label of their own", sum(one in ("supplied", "override") for one in sources)),
+            ("with a label of their own", sum(one in OWN_LABEL_SOURCES for one in sources)),
             ("named by their cluster", sources.count("propagated")),
             ("unassigned", sources.count("unassigned")),
             ("quarantined", run["quarantined"]),
         ]
     )
-    made = f"Snapshot {catalog.snapshot.snapshot_id} of {run['finished_at']:%Y-%m-%d %H:%M} UTC"
+    created = datetime.fromisoformat(catalog.snapshot.created_at).astimezone(UTC)
+    made = f"Snapshot {catalog.snapshot.snapshot_id} of {created:%Y-%m-%d %H:%M} UTC"
     library = ", ".join(f"<code>{escape(one)}</code>" for one in run["library"])
     return (
         f'<h1><bdi>{escape(catalog_name(catalog))}</bdi></h1>\n<p class="quiet">{made}, by motionary '
         f"{escape(run['version'])}, from {library}</p>\n{figures}"
     )
+
+
+def clusters_section(*body: str, further: str = "") -> str:
+    """Say what clusters are, before what shows them; `further` ends the sentence or two in plain text."""
+    return section(
+        "Clusters",
+        "Clips that move alike. Labelled are those with a label of their own, and purity is the share of "
+        f"the commonest of these; the reference is the clip that the others are aligned to.{further}",
+        *body,
+        name="clusters",
+    )
+
+
+def no_clusters_section() -> str:
+    """Say that there is no cluster."""
+    return section("Clusters", "No clip could be read, so there is nothing to cluster.", name="clusters")
+
+
+def clusters_table(clusters: Sequence[dict[str, Any]], linked: Collection[int] = ()) -> str:
+    """List clusters, rows of `cluster_table`; the names of those `linked` lead to their cards."""
+    rows: list[list[Cell]] = []
+    for one in clusters:
+        number, name = one["cluster_id"], isolated(one["label"] or "unnamed")
+        rows.append(
+            [
+                cluster_mark(number),
+                number,
+                Html(f'<a href="#cluster-{number}">{name.text}</a>') if number in linked else name,
+                one["size"],
+                one["labelled"],
+                purity_text(one),
+                isolated(one["reference"]),
+            ]
+        )
+    return table(["", "cluster", "name", "clips", "labelled", "purity", "reference"], rows)
+
+
+def members_table(members: Sequence[dict[str, Any]]) -> str:
+    """List clips of a cluster, rows of `cluster_members`."""
+    rows: list[list[Cell]] = [
+        [
+            Html(isolated(one["clip_id"]).text + (" (reference)" if one["is_reference"] else "")),
+            isolated(one["label"] or "none"),
+            one["label_source"],
+            f"{one['confidence']:.2f}",
+            one["distance_to_reference"],
+        ]
+        for one in members
+    ]
+    return table(["clip", "label", "from", "confidence", "distance to reference"], rows)
+
+
+def purity_text(cluster: dict[str, Any]) -> str:
+    """Write the purity of a cluster, a row of `cluster_table`."""
+    return "-" if cluster["purity"] is None else f"{cluster['purity']:.2f}"
 
 
 def dendrogram_section(catalog: Catalog, figure: go.Figure | None, show: Show) -> str:

@@ -3,7 +3,8 @@
 Each clip, aligned, less the cluster's reference is its residual; the axes are the principal ones of the
 cluster's residuals, the widest first. An axis points to where its largest value is positive, as
 `motionary.pipeline.style.space` has it. Like clips lie together whatever the axes are; what an axis means is
-told by the clips at its ends.
+told by the clips at its ends. Places have no unit: a residual is a vector of angles in radians and of lengths
+in leg lengths (`motionary.pipeline.style.Residual.vector`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 _TELLING = ("style", "subject", "label")
 _NAMED_JOINTS = 3
+_UNITLESS = "no unit: a residual weighs<br>radians and leg lengths together"
 
 
 def style_figure(catalog: Catalog, cluster_id: int) -> go.Figure:
@@ -145,18 +147,17 @@ def _arrange(figure: go.Figure, rows: list[dict]) -> None:
     explained = rows[0]["explained"]
     figure.update_layout(
         **CHART,
-        height=480,
-        margin={"l": 60, "r": 20, "t": 30, "b": 55},
+        height=515,
+        margin={"l": 60, "r": 20, "t": 30, "b": 90},
         showlegend=True,
         legend={"groupclick": "toggleitem"},
         clickmode="event",
         hovermode="closest",
     )
-    unit = "rad" if rows[0]["kind"] == "rotations" else "leg lengths"
     axis = {**AXIS, "zeroline": True, "zerolinecolor": GREY}
-    names = [f"axis {k + 1} ({unit}): {share:.0%} of the variance" for k, share in enumerate(explained[:2])]
+    names = [f"axis {k + 1}: {share:.0%} of the variance" for k, share in enumerate(explained[:2])]
     along, across = [*names, *["nothing varies along it"] * 2][:2]
-    figure.update_xaxes(**axis, title=along)
+    figure.update_xaxes(**axis, title=f"{along}<br><sub>{_UNITLESS}</sub>")
     figure.update_yaxes(**axis, title=across, scaleanchor="x")
     if not explained:
         figure.update_xaxes(range=[-1, 1], showticklabels=False)

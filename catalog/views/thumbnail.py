@@ -24,13 +24,8 @@ from numpy.typing import NDArray
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.colours import COLOURS, GREY
-from motionary.pipeline.canonical import (
-    CANONICAL_JOINTS,
-    Convention,
-    UnknownSkeletonError,
-    canonical_indices,
-    find_convention,
-)
+from motionary.catalog.views.figure_body import body_size, canonical_body
+from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention
 from motionary.pipeline.motion import FloatArray, Motion, Skeleton
 from motionary.pipeline.normalise import headings, turn_about_vertical
 
@@ -130,11 +125,10 @@ class _Body:
 
 
 def _body_of(skeleton: Skeleton, conventions: Sequence[Convention]) -> _Body:
-    try:
-        convention = find_convention(skeleton.names, conventions)
-    except UnknownSkeletonError:
+    body = canonical_body(skeleton, conventions)
+    if not body:
         return _Body(np.arange(len(skeleton.names)), _branches(skeleton), None, known=False)
-    return _Body(canonical_indices(skeleton, convention), _CANONICAL_LINES, _HEAD_JOINT, known=True)
+    return _Body(np.array([*body.values()]), _CANONICAL_LINES, _HEAD_JOINT, known=True)
 
 
 def _line(colour: str, joints: str) -> tuple[str, tuple[int, ...]]:
@@ -154,13 +148,11 @@ _HEAD_JOINT = CANONICAL_JOINTS.index("head")
 def _branches(skeleton: Skeleton) -> tuple[tuple[str, tuple[int, ...]], ...]:
     """Part a tree into lines from where each branches off to its end, leaving out the shortest bones."""
     lengths = np.linalg.norm(skeleton.offsets, axis=1)
-    reach = np.zeros(len(lengths))
-    for joint in range(1, len(lengths)):
-        reach[joint] = reach[skeleton.parents[joint]] + lengths[joint]
+    least = _LEAST_BONE * body_size(skeleton)
     lines: dict[int, list[int]] = {}  # by the joint that each has come to
     ended = []
     for joint in range(1, len(lengths)):
-        if lengths[joint] < _LEAST_BONE * reach.max():
+        if lengths[joint] < least:
             continue
         line = lines.pop(skeleton.parents[joint], [skeleton.parents[joint]])
         lines[joint] = [*line, joint]

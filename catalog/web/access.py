@@ -17,6 +17,9 @@ Text of the catalog that is script
     It is escaped where it is shown; should that fail somewhere, the content security policy runs no script
     but this server's own files, and lets none send anything elsewhere.
 
+A condition of a search that takes all of the machine
+    It may compare columns and nothing else: `condition.py`.
+
 What is not: the connection is not encrypted, so that on another address whoever can listen on the network
 reads the token and the pages (`ssh -L` or a proxy with TLS helps). Cookies know no ports: another server on
 this host that the same browser visits is sent the cookie, which is not the token but opens this server as

@@ -16,11 +16,13 @@ from motionary.catalog.web.clip_page import clip
 from motionary.catalog.web.cluster_pages import cluster, cluster_map
 from motionary.catalog.web.compare_page import compare
 from motionary.catalog.web.data import send_figure, send_pair, send_scene, send_thumbnail, suggest
-from motionary.catalog.web.drop import drop_routes
-from motionary.catalog.web.edits import Editor, edit_routes
+from motionary.catalog.web.desk import Desk, Editor
+from motionary.catalog.web.drop import Tables, drop_routes
+from motionary.catalog.web.edits import edit_routes
 from motionary.catalog.web.opened import CatalogGone, Opened
 from motionary.catalog.web.render import render
 from motionary.catalog.web.review_pages import review_routes
+from motionary.catalog.web.review_queue import ReviewQueue
 from motionary.catalog.web.static_files import send_static
 
 _ROUTES = [
@@ -68,7 +70,9 @@ def create_app(url: str, *, guard: Guard, editor: Editor | None = None) -> Starl
         exception_handlers={kind: _explained for kind in (HTTPException, CatalogError, Exception)},
     )
     app.state.opened = opened
-    app.state.editor = editor
+    app.state.desk = None if editor is None else Desk(editor, opened.look)
+    app.state.review_queue = ReviewQueue()
+    app.state.drop_tables = Tables()
     return app
 
 

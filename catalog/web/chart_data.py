@@ -17,6 +17,7 @@ from motionary.catalog.views.charts import CONFIG
 from motionary.catalog.views.cluster_map import cluster_map_figure
 from motionary.catalog.views.cost_matrix import cost_matrix_figure
 from motionary.catalog.views.curve_chart import curve_figure
+from motionary.catalog.views.library_map import map_places
 from motionary.catalog.views.style_chart import style_figure
 from motionary.catalog.views.trajectory_chart import trajectory_figure
 from motionary.catalog.views.warp_chart import warp_figure
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 MAP = ("map",)
-"""What the map is kept under."""
+"""What the map is kept under, and the places of its clips."""
 
 # A picture would be made from a blob:, which the content security policy does not let an image come from.
 _CONFIG = CONFIG | {"modeBarButtonsToRemove": ["toImage", "select2d", "lasso2d"]}
@@ -55,7 +56,11 @@ _Chart = tuple[tuple, Callable[[], "go.Figure"]]
 
 
 def _map(request: Request, shown: Shown) -> _Chart:
-    return MAP, lambda: cluster_map_figure(shown.catalog)
+    def make() -> go.Figure:
+        places = shown.keep("places", MAP, lambda: map_places(shown.catalog))
+        return cluster_map_figure(shown.catalog, places)
+
+    return MAP, make
 
 
 def _style(request: Request, shown: Shown) -> _Chart:
@@ -95,10 +100,11 @@ def _costs(request: Request, shown: Shown) -> _Chart:
 def wanted_cluster(request: Request, name: str) -> int:
     """Read a cluster's number from the query."""
     asked = request.query_params.get(name, "")
-    known = {one for one in shown_to(request).keep("answer", "cluster numbers", lambda: _numbers(request))}
-    if not (asked.isascii() and asked.isdigit() and int(asked[:9]) in known):
+    known = shown_to(request).keep("answer", "cluster numbers", lambda: _numbers(request))
+    number = int(asked) if asked.isascii() and asked.isdigit() and len(asked) < 20 else None
+    if number is None or number not in known:
         raise HTTPException(404, f"there is no cluster {asked[:40]!r}; /clusters lists them")
-    return int(asked)
+    return number
 
 
 def _numbers(request: Request) -> frozenset[int]:

@@ -7,11 +7,12 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import Response
 
+from motionary.catalog.description import duration
 from motionary.catalog.query import Catalog
 from motionary.catalog.web.data import wanted_clip
 from motionary.catalog.web.opened import Shown
-from motionary.catalog.web.render import duration, render, shown_to
-from motionary.catalog.web.search import clip_rows, label_columns
+from motionary.catalog.web.render import render, shown_to
+from motionary.catalog.web.search import label_columns, near_rows
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.style.rig import REGIONS
 
@@ -108,6 +109,4 @@ def _style(row: dict[str, Any]) -> list[tuple[str, float, float]]:
 def _neighbours(shown: Shown, clip_id: str) -> list[dict[str, Any]]:
     if len(shown.catalog.clips) < 2:
         return []
-    found = shown.catalog.similar(clip_id, _NEIGHBOURS).table
-    distances = dict(zip(found["clip_id"].to_pylist(), found["distance"].to_pylist(), strict=True))
-    return [row | {"distance": distances[row["clip_id"]]} for row in clip_rows(shown.catalog, [*distances])]
+    return near_rows(shown.catalog, shown.catalog.similar(clip_id, _NEIGHBOURS))

@@ -45,10 +45,10 @@ def cluster(request: Request) -> Response:
 
 
 def cluster_map(request: Request) -> Response:
-    """Answer /map; its script asks for the chart, which is made once a snapshot."""
+    """Answer /map; its script asks for the chart, whose places are found once a run."""
     shown = shown_to(request)
     clips = len(shown.catalog.clips)
-    waits = clips > _MANY and not shown.ready("chart", MAP)
+    waits = clips > _MANY and not shown.ready("places", MAP)
     return render(request, "map.html", clips=clips, waits=waits)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -22,22 +23,32 @@ _METRICS = {
 
 
 def compare(request: Request) -> Response:
-    """Answer /compare?a=&b=; where one is missing, the page asks for it."""
+    """Answer /compare?a=&b=; where one is missing or is no clip, the page asks for it."""
     shown = shown_to(request)
     a, b = request.query_params.get("a", ""), request.query_params.get("b", "")
     given = [one for one in (a, b) if one]
-    require(shown, *given)
+    try:
+        require(shown, *given)
+    except HTTPException as error:
+        return _asked_again(request, a, b, error)
     why = explanation(shown, a, b) if len(given) == 2 else None
     return render(
         request,
         "compare.html",
         a=a,
         b=b,
+        wrong=None,
         why=why,
         rows=clip_rows(shown.catalog, given),
         distances=_distances(why) if why else [],
         parts=_parts(why) if why else [],
         short=short_text,
+    )
+
+
+def _asked_again(request: Request, a: str, b: str, error: HTTPException) -> Response:
+    return render(
+        request, "compare.html", status=error.status_code, a=a, b=b, wrong=error.detail, why=None, rows=[]
     )
 
 

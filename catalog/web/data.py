@@ -12,7 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from motionary.catalog.errors import CatalogError
+from motionary.catalog.errors import UnknownClip
 from motionary.catalog.explanation import Explanation
 from motionary.catalog.views.figures import Figure, Layout, clip_figure, scene
 from motionary.catalog.views.thumbnail import thumbnail_svg
@@ -91,7 +91,7 @@ def require(shown: Shown, *clip_ids: str) -> None:
     """Refuse what is no clip; the message tells the nearest names."""
     try:
         shown.catalog.require(*clip_ids)
-    except CatalogError as error:
+    except UnknownClip as error:
         raise HTTPException(404, str(error)) from error
 
 

@@ -28,7 +28,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from motionary.catalog.errors import CatalogError
+from motionary.catalog.errors import NoClips
 from motionary.catalog.explanation import Explanation
 from motionary.catalog.given_files import Given
 from motionary.catalog.query import Catalog
@@ -36,7 +36,7 @@ from motionary.catalog.views.figures import figure_of, scene
 from motionary.catalog.web.data import figure
 from motionary.catalog.web.opened import Shown
 from motionary.catalog.web.render import render, shown_to
-from motionary.catalog.web.search import clip_rows
+from motionary.catalog.web.search import near_rows
 from motionary.pipeline.canonical import SkeletonError
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import FORMATS, ReadError, read_motion
@@ -86,7 +86,7 @@ def drop_page(request: Request) -> Response:
 
 async def look(request: Request) -> Response:
     """Answer POST /drop."""
-    tables = _Tables.of(request)
+    tables: Tables = request.app.state.drop_tables
     try:
         with tables.place(), tempfile.TemporaryDirectory(prefix="motionary-drop-") as folder:
             sent = _sent(request)
@@ -94,7 +94,7 @@ async def look(request: Request) -> Response:
             files = {one: Path(folder, named[one]) for one in sent}
             await _receive(request, files)
             async with tables.turn:
-                found = await run_in_threadpool(_looked_at, shown_to(request), files[motion], motion.name)
+                found = await run_in_threadpool(_looked_at, request, files[motion], motion.name)
     except CannotLook as error:
         return render(request, "dropped.html", status=error.status, error=error)
     return render(request, "dropped.html", error=None, **found)
@@ -103,21 +103,15 @@ async def look(request: Request) -> Response:
 drop_routes = [Route("/drop", drop_page), Route("/drop", look, methods=["POST"])]
 
 
-class _Tables:
+class Tables:
     """How many files are looked at: one at a time, while a few more arrive or wait."""
 
     def __init__(self) -> None:
         self.turn = asyncio.Lock()
         self._taken = 0
 
-    @classmethod
-    def of(cls, request: Request) -> _Tables:
-        state = request.app.state
-        if not hasattr(state, "drop_tables"):
-            state.drop_tables = cls()
-        return state.drop_tables
-
-    def place(self) -> _Tables:
+    def place(self) -> Tables:
+        """Return what holds a place as long as it is entered; where there is none, refuse."""
         if self._taken >= _MOST_WAITING:
             raise CannotLook(503, f"{self._taken} files are being looked at", "try again in a moment")
         return self
@@ -134,11 +128,8 @@ def _sent(request: Request) -> list[Sent]:
     header = request.headers.get("x-motionary-files", "")
     try:
         listed = json.loads(unquote(header, errors="strict"))
-        sent = [
-            Sent(PurePosixPath(str(one["name"]).replace("\\", "/")).name[-_LONGEST_NAME:], int(one["size"]))
-            for one in listed
-        ]
-    except (ValueError, TypeError, KeyError):
+        sent = [Sent(_last_part(one["name"]), int(one["size"])) for one in listed]
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
         sent = []
     declared = request.headers.get("content-length", "")
     total = sum(one.size for one in sent)
@@ -152,14 +143,24 @@ def _sent(request: Request) -> list[Sent]:
     return sent
 
 
+def _last_part(name: object) -> str:
+    """Return a file's own name, of a path of any system, as text that can be shown."""
+    own = PurePosixPath(str(name).replace("\\", "/")).name[-_LONGEST_NAME:]
+    return own.encode("utf-8", "replace").decode()
+
+
 def _named(sent: Sequence[Sent]) -> tuple[Sent, dict[Sent, str]]:
     """Find which file is the motion, and name all for the disk: no part of a given name but plain letters."""
     motions = [one for one in sent if one.suffix in SUFFIXES]
     bodies = [one for one in sent if one.suffix == ".asf"]
     if len(motions) != 1 or len(motions) + len(bodies) != len(sent) or len(bodies) > 1:
         kinds = ", ".join(SUFFIXES)
-        what = f"{len(sent)} files were given, of which {len(motions)} are motions ({kinds})"
-        raise CannotLook(415, what, "give one motion, and with an AMC its ASF")
+        if len(sent) == 1:
+            what, mend = f"{sent[0].suffix or 'such a file'} is not read here", f"give one of {kinds}"
+        else:
+            what = f"{len(sent)} files were given, of which {len(motions)} are motions ({kinds})"
+            mend = "give one motion, and with an AMC its ASF"
+        raise CannotLook(415, what, mend)
     motion = motions[0]
     if (motion.suffix == ".amc") != bool(bodies):
         what = (
@@ -196,11 +197,11 @@ def _written(piece: bytes, rest: list[tuple[IO[bytes], int]]) -> list[tuple[IO[b
     return rest
 
 
-def _looked_at(shown: Shown, path: Path, name: str) -> dict[str, Any]:
+def _looked_at(request: Request, path: Path, name: str) -> dict[str, Any]:
     """Read a motion and tell all that is shown of it; in a thread."""
-    catalog = shown.catalog
+    shown = shown_to(request)
     try:
-        motion = _read(catalog, path)
+        motion = _read(shown.catalog, path)
     except ReadError as error:
         line = f"line {error.line}: " if error.line else ""
         raise CannotLook(422, f"{line}{error.what}", error.mend) from None
@@ -210,7 +211,7 @@ def _looked_at(shown: Shown, path: Path, name: str) -> dict[str, Any]:
         found |= _compared(shown, path, motion)
     except SkeletonError as error:
         found["cannot"] = f"{error.what}; {error.mend}"
-    except CatalogError as error:  # of a catalog without clips
+    except NoClips as error:
         found["cannot"] = str(error)
     beside = [figure(shown, row["clip_id"]) for row in found["rows"][:1]]
     return found | {"scene": scene([drawn, *beside])}
@@ -228,11 +229,11 @@ def _read(catalog: Catalog, path: Path) -> Motion:
 def _compared(shown: Shown, path: Path, motion: Motion) -> dict[str, Any]:
     catalog = shown.catalog
     near = catalog.similar(path, _NEIGHBOURS)
-    distances = dict(zip(near.table["clip_id"].to_pylist(), near.table["distance"].to_pylist(), strict=True))
-    why = catalog.explain(path, next(iter(distances)))
+    rows = near_rows(catalog, near)
+    why = catalog.explain(path, rows[0]["clip_id"])
     return {
         "how": near.how,
-        "rows": [row | {"distance": distances[row["clip_id"]]} for row in clip_rows(catalog, [*distances])],
+        "rows": rows,
         "assigned": catalog.assign(Given(motion.name, motion)).to_pylist()[0],
         "why": why,
         "parts_of_it": _parts(why),

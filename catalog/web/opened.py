@@ -1,21 +1,23 @@
 """The published snapshot, as long as it is the published one, and what was made of it.
 
 Every request asks once and works on what it got: a request that runs while another snapshot is published
-ends on the one it began with. What a page needs again (answers, thumbnails, charts) is made once, by
-whoever asks first, and the others wait for that. A part of a catalog never changes under its name, so what
-was made of motions alone is still right in a snapshot that names the same files: a new label draws no
-thumbnail anew.
+ends on the one it began with. Whether another is published is looked up once a second at most, for a store
+may be far away; what this server itself publishes is looked up at once. What a page needs again (answers,
+thumbnails, charts) is made once, by whoever asks first, and the others wait for that. A part of a catalog
+never changes under its name, so what was made of some tables alone is still right in a snapshot that names
+the same files of them: a new label draws no thumbnail anew, and moves nothing on the map.
 """
 
 from __future__ import annotations
 
 import hashlib
+import pickle
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from dataclasses import replace
 from importlib.metadata import version
+from time import monotonic
 from typing import Any, TypeVar
 
 from motionary.catalog.errors import CatalogError
@@ -25,10 +27,14 @@ from motionary.catalog.store import Store
 
 T = TypeVar("T")
 
-_MOTION_TABLES = ("clips", "frames")
-_LARGE = ("frames", "features", "resampled", "aligned", "pairs", "quarantine")
-_MOST = {"thumbnail": 12_000, "figure": 200, "chart": 60, "search": 40, "answer": 300}
-"""How many of a kind are kept; a thumbnail is of some 3 kB, a search of as many clip_ids as it found."""
+LOOK_EVERY = 1.0
+"""Seconds for which the published snapshot is taken for the published one."""
+
+MOST_KEPT = 256_000_000
+"""Bytes of all that is kept, pickled; 10,000 thumbnails are some 30 MB of it."""
+
+_MADE_OF = {"thumbnail": ("clips", "frames"), "places": ("clips", "pairs", "runs")}
+"""Kinds of things that are made of some tables alone; `runs` holds by which distance clips are compared."""
 
 
 class CatalogGone(CatalogError):
@@ -36,11 +42,18 @@ class CatalogGone(CatalogError):
 
 
 class Kept:
-    """Things that are made once each, the most recently asked for; safe from any thread."""
+    """Things that are made once each, the most recently asked for; safe from any thread.
+
+    Parameters
+    ----------
+    most : int
+        Bytes that all of them take together with their keys, pickled.
+    """
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._made: OrderedDict[Hashable, Future] = OrderedDict()
+        self._bytes: dict[Hashable, int] = {}
         self._lock = threading.Lock()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
@@ -54,20 +67,29 @@ class Kept:
             future: Future = Future() if waiting is None else waiting
             self._made[key] = future
             self._made.move_to_end(key)
-            while len(self._made) > self._most:
-                self._made.popitem(last=False)
         if ours:
             self._fill(key, future, make)
         return future.result()
 
     def _fill(self, key: Hashable, future: Future, make: Callable[[], Any]) -> None:
         try:
-            future.set_result(make())
+            made = make()
+            size = len(pickle.dumps((key, made), pickle.HIGHEST_PROTOCOL))
         except BaseException as error:
             with self._lock:
-                if self._made.get(key) is future:
-                    del self._made[key]
+                del self._made[key]
             future.set_exception(error)
+            return
+        future.set_result(made)
+        with self._lock:
+            self._bytes[key] = size
+            if size > self._most:
+                self._forget(key)
+            while sum(self._bytes.values()) > self._most:
+                self._forget(next(one for one in self._made if one in self._bytes))
+
+    def _forget(self, key: Hashable) -> None:
+        del self._made[key], self._bytes[key]
 
     def ready(self, key: Hashable) -> bool:
         """Tell whether something is kept already, and not just being made."""
@@ -81,39 +103,41 @@ class Shown:
     Parameters
     ----------
     catalog : Catalog
-    before : Shown, optional
-        What was shown until now; thumbnails of the same motions are taken over.
+    kept : Kept
+        What was made of this catalog's snapshots.
 
     Attributes
     ----------
     catalog : Catalog
-    facts : Catalog
-        The same without the tables of many files, frames and pairs: what a condition from a page is asked of.
-        So it can neither read for minutes nor, where it is wrong, have ten thousands of files looked at for
-        damage.
     edition, motions_edition : str
         What the whole snapshot is known by, and its motions.
     """
 
-    def __init__(self, catalog: Catalog, before: Shown | None = None) -> None:
+    def __init__(self, catalog: Catalog, kept: Kept) -> None:
         self.catalog = catalog
         tables = catalog.snapshot.tables
-        few = {name: files for name, files in tables.items() if name not in _LARGE}
-        self.facts = Catalog(catalog.store, replace(catalog.snapshot, tables=few), catalog.lease)
         url = catalog.store.url
-        self.motions_edition = _digest(url, *(file for name in _MOTION_TABLES for file in tables[name]))
         self.edition = _digest(url, catalog.snapshot.snapshot_id, catalog.snapshot.created_at)
-        self._kept = {kind: Kept(most) for kind, most in _MOST.items()}
-        if before is not None and before.motions_edition == self.motions_edition:
-            self._kept["thumbnail"] = before._kept["thumbnail"]
+        self._kept = kept
+        self._editions = {
+            kind: _digest(url, *(file for name in names for file in tables.get(name, ())))
+            for kind, names in _MADE_OF.items()
+        }
+        self.motions_edition = self._editions["thumbnail"]
 
     def keep(self, kind: str, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what is kept of a kind (see `_MOST`), made when it is first asked for."""
-        return self._kept[kind].get(key, make)
+        """Return what is kept of a kind, made when it is first asked for of this snapshot.
+
+        Kinds of `_MADE_OF` are kept as long as their tables are the same.
+        """
+        return self._kept.get(self._name(kind, key), make)
 
     def ready(self, kind: str, key: Hashable) -> bool:
         """Tell whether that needs no making."""
-        return self._kept[kind].ready(key)
+        return self._kept.ready(self._name(kind, key))
+
+    def _name(self, kind: str, key: Hashable) -> Hashable:
+        return kind, self._editions.get(kind, self.edition), key
 
 
 class Opened:
@@ -128,7 +152,10 @@ class Opened:
     def __init__(self, url: str) -> None:
         self.url = url
         self._store = Store(url)
-        self._lock = threading.Lock()
+        self._kept = Kept(MOST_KEPT)
+        self._lock = threading.Lock()  # for a moment only: the store is asked outside
+        self._due = 0.0
+        self._looks = self._latest = 0
         self._state: object = None
         self._shown: Shown | None = None
 
@@ -140,6 +167,8 @@ class Opened:
     def shown(self) -> Shown:
         """Return the published snapshot with what was made of it; ask once a request.
 
+        It was the published one within `LOOK_EVERY`; who asks while it is looked up gets the one before.
+
         Raises
         ------
         CatalogGone
@@ -148,17 +177,41 @@ class Opened:
             It cannot be opened.
         """
         with self._lock:
-            state = self._published()
-            if self._shown is None or state != self._state:
+            shown, now = self._shown, monotonic()
+            if shown is not None and now < self._due:
+                return shown
+            self._due = now + LOOK_EVERY
+        return self.look()
+
+    def look(self) -> Shown:
+        """Look up which snapshot is published, now, and return it; raises as `shown`."""
+        with self._lock:
+            self._looks += 1
+            look, state, shown = self._looks, self._state, self._shown
+        try:
+            published = self._published()
+            if shown is None or published != state:
                 # The one before closes itself when the last request that reads it ends.
-                self._shown, self._state = Shown(Catalog.open(self.url), self._shown), state
-            return self._shown
+                shown = Shown(Catalog.open(self.url), self._kept)
+        except BaseException as error:
+            self._failed(look, error)
+            raise
+        with self._lock:
+            if look > self._latest:  # one that began later knows better
+                self._latest, self._state, self._shown = look, published, shown
+            return self._shown or shown
+
+    def _failed(self, look: int, error: BaseException) -> None:
+        """Have everybody look until it works, also where one is shown meanwhile."""
+        with self._lock:
+            self._due = 0.0
+            if isinstance(error, CatalogGone) and look > self._latest:
+                self._latest, self._state, self._shown = look, None, None
 
     def _published(self) -> object:
         """Tell which publication is the current one: its id, and when that was written."""
         snapshot_id = current_id(self._store)
         if snapshot_id is None:
-            self._shown = self._state = None
             raise CatalogGone(
                 f"{self.url} is not a catalog, or no longer; make one with: motionary run LIBRARY {self.url}"
             )

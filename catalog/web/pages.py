@@ -52,6 +52,7 @@ def search(request: Request) -> Response:
         condition=condition,
         other=other,
         wrong=wrong,
+        like_sql=not condition and any(sign in words for sign in "=<>"),
         columns=["clip_id", "label", "cluster_id", "seconds", *label_columns(shown.catalog)],
         found=found,
         rows=clip_rows(shown.catalog, found.rows) if found.rows else [],

@@ -7,10 +7,13 @@ from importlib.resources import files
 from urllib.parse import urlencode
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from motionary.catalog.description import duration
 from motionary.catalog.views.colours import cluster_character, cluster_colour
+from motionary.catalog.views.page import isolated
 from motionary.catalog.web.opened import Opened, Shown
 from motionary.catalog.web.static_files import static_url
 
@@ -35,7 +38,7 @@ def render(request: Request, template: str, *, status: int = 200, **context: obj
         "snapshot": shown.catalog.snapshot.snapshot_id if shown else None,
         "edition": shown.edition if shown else "",
         "motions_edition": shown.motions_edition if shown else "",
-        "editable": request.app.state.editor is not None,
+        "editable": request.app.state.desk is not None,
         "here": request.url.path,
         "words": "",
     }
@@ -55,11 +58,8 @@ def link(path: str, **query: object) -> str:
     return f"{path}?{urlencode(given, doseq=True)}" if given else path
 
 
-def duration(seconds: float) -> str:
-    """Write a length as people read it."""
-    if seconds < 120:
-        return f"{seconds:.1f} s"
-    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+def _isolated(name: str) -> Markup:
+    return Markup(isolated(name).text)
 
 
 _TEMPLATES = Environment(
@@ -72,4 +72,4 @@ _TEMPLATES = Environment(
 _TEMPLATES.globals.update(
     link=link, static=static_url, cluster_colour=cluster_colour, cluster_character=cluster_character
 )
-_TEMPLATES.filters["duration"] = duration
+_TEMPLATES.filters.update({"duration": duration, "isolated": _isolated})

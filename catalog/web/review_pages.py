@@ -14,28 +14,17 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from motionary.catalog.web.edits import desk_of
+from motionary.catalog.review import REASONS
 from motionary.catalog.web.opened import Shown
 from motionary.catalog.web.render import link, render, shown_to
-from motionary.catalog.web.review_queue import ReviewQueue
-
-WHY = {
-    "moved": "a file with its bytes had a label and is gone, and it is not clear which is meant",
-    "contradiction": "the same motion, or almost, has another label elsewhere",
-    "mislabelled": "its label is not that of its cluster",
-    "uncertain": "its name came from the cluster, with little confidence",
-    "unassigned": "it has no name",
-    "duplicate": "an earlier clip is the same motion, or almost",
-}
-"""What the reasons of `motionary.catalog.review` mean, in a sentence."""
 
 _MOST_KNOWN = 2000
 
 
 def review_page(request: Request) -> Response:
     """Answer /review."""
-    shown, queue = shown_to(request), _queue_of(request)
-    listed = queue.listed(shown.catalog, again="again" in request.query_params)
+    shown, state = shown_to(request), request.app.state
+    listed = state.review_queue.listed(shown.catalog, again="again" in request.query_params)
     wanted = request.query_params.get("clip")
     if listed is None and wanted is None:
         return render(request, "review_wait.html")
@@ -46,14 +35,13 @@ def review_page(request: Request) -> Response:
     now = None if clip_id is None else names.get(clip_id) or _names(shown, [clip_id]).get(clip_id)
     if clip_id is not None and now is None:
         raise HTTPException(404, f"there is no clip {clip_id!r}")
-    desk = desk_of(request)
     return render(
         request,
         "review.html",
         clip_id=clip_id,
         item=None if now is None else _item(rows.get(clip_id or ""), now),
         known=shown.keep("answer", "known labels", lambda: _known(shown)),
-        last=desk and desk.last,
+        last=state.desk and state.desk.last,
         outdated=listed is not None and listed.snapshot != shown.catalog.snapshot.snapshot_id,
         total=len(there),
         decided=sum(names[one]["decided"] for one in there),
@@ -64,13 +52,6 @@ def review_page(request: Request) -> Response:
 review_routes = [Route("/review", review_page)]
 
 
-def _queue_of(request: Request) -> ReviewQueue:
-    state = request.app.state
-    if not hasattr(state, "review_queue"):
-        state.review_queue = ReviewQueue()
-    return state.review_queue
-
-
 def _item(row: dict[str, Any] | None, now: dict[str, Any]) -> dict[str, Any]:
     """Put together what is shown of a clip: the list's row, where it is listed, and what it is called now."""
     row = row or {"reason": None, "suggested": None, "other": None, "urgency": None, "distance": None}
@@ -79,7 +60,7 @@ def _item(row: dict[str, Any] | None, now: dict[str, Any]) -> dict[str, Any]:
     return {
         **row,
         **now,
-        "why": WHY.get(row["reason"] or "", ""),
+        "why": REASONS.get(row["reason"] or "", ""),
         "proposed": other_name or now["label"],
         "beside": beside,
         "scene": link("/data/scene", clip=[one for one in (beside, now["clip_id"]) if one]),

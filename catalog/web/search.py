@@ -10,13 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from motionary.catalog.errors import CatalogError
+from motionary.catalog.neighbours import Similar
 from motionary.catalog.query import Catalog
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.sql import quoted
+from motionary.catalog.web.condition import refuse_more_than_a_comparison
 from motionary.catalog.web.opened import Shown
 from motionary.pipeline.tables import LABEL_COLUMNS
 
 PAGE = 50
+_MOST_WORDS = 20
+
 _LONG = ("description", "licence")
 """Labels that are sentences, which a list has no room for."""
 _ROW = (
@@ -66,9 +71,12 @@ def find(shown: Shown, words: str, condition: str = "") -> Sequence[str]:
     Raises
     ------
     CatalogError
-        It is no condition, with DuckDB's message.
+        There are more words than anybody means, or it is no condition; see
+        `motionary.catalog.web.condition`.
     """
     asked = tuple(dict.fromkeys(words.lower().split()))
+    if len(asked) > _MOST_WORDS:
+        raise CatalogError(f"{len(asked):,} words are asked for at once; ask for {_MOST_WORDS} at most")
     return shown.keep("search", ("find", asked, condition), lambda: _find(shown, asked, condition))
 
 
@@ -85,6 +93,12 @@ def clip_rows(catalog: Catalog, clip_ids: Sequence[str]) -> list[dict]:
     return [rows[one] for one in clip_ids]
 
 
+def near_rows(catalog: Catalog, near: Similar) -> list[dict]:
+    """Read what lists tell of the clips most like something, with their distances, the nearest first."""
+    distances = dict(zip(near.table["clip_id"].to_pylist(), near.table["distance"].to_pylist(), strict=True))
+    return [row | {"distance": distances[row["clip_id"]]} for row in clip_rows(catalog, [*distances])]
+
+
 def label_columns(catalog: Catalog) -> list[str]:
     """List the columns of supplied labels, the usual ones first."""
 
@@ -96,7 +110,7 @@ def label_columns(catalog: Catalog) -> list[str]:
 
 
 def _find(shown: Shown, words: Sequence[str], condition: str) -> Sequence[str]:
-    catalog = shown.facts
+    catalog = shown.catalog
     texts = ", ".join(map(quoted, ("clip_id", "label", *label_columns(catalog))))
     has = [f"contains(lower(concat_ws(chr(10), {texts})), $w{number})" for number in range(len(words))]
     query = f"select clip_id from takes where {' and '.join(has) or 'true'} order by clip_id"
@@ -104,5 +118,6 @@ def _find(shown: Shown, words: Sequence[str], condition: str) -> Sequence[str]:
     clip_ids = found["clip_id"].to_pylist()
     if not condition.strip():
         return clip_ids
+    refuse_more_than_a_comparison(condition)
     fulfil = shown.keep("search", ("where", condition), lambda: set(catalog.where(condition).clip_ids))
     return [one for one in clip_ids if one in fulfil]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import mimetypes
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 
 from starlette.exceptions import HTTPException
@@ -27,12 +28,14 @@ class StaticFile:
     edition: str
 
 
-@cache
 def static_file(name: str) -> StaticFile | None:
     """Return a file by its name in the URL, None where there is none."""
-    content = _content(name)
-    if content is None:
-        return None
+    return _read(name) if name in _CONTENTS else None
+
+
+@cache
+def _read(name: str) -> StaticFile:
+    content = _CONTENTS[name]()
     media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
     return StaticFile(content, media_type, hashlib.blake2b(content, digest_size=8).hexdigest())
 
@@ -53,12 +56,19 @@ def send_static(request: Request) -> Response:
     return cached_response(request, file.edition, file.media_type, lambda: file.content)
 
 
-def _content(name: str) -> bytes | None:
-    if name == "plotly.js":
-        from plotly.offline import get_plotlyjs
+def _plotly() -> bytes:
+    from plotly.offline import get_plotlyjs
 
-        return get_plotlyjs().encode()
-    if name in _OF_VIEWS:
-        return asset(name).encode()
-    own = {one.name: one for one in files(__package__).joinpath("static").iterdir() if one.is_file()}
-    return own[name].read_bytes() if name in own else None
+    return get_plotlyjs().encode()
+
+
+def _of_views(name: str) -> bytes:
+    return asset(name).encode()
+
+
+_CONTENTS: dict[str, Callable[[], bytes]] = {
+    "plotly.js": _plotly,
+    **{name: partial(_of_views, name) for name in _OF_VIEWS},
+    **{one.name: one.read_bytes for one in files(__package__).joinpath("static").iterdir() if one.is_file()},
+}
+"""Every file there is: what is not among them is never kept."""

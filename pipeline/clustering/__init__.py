@@ -22,12 +22,13 @@ from motionary.pipeline.clustering.linkage import (
     ward_linkage,
 )
 from motionary.pipeline.clustering.modularity import modularity_cut, nearest_neighbour_graph
-from motionary.pipeline.clustering.naming import LabelSource, Names, name_clusters
+from motionary.pipeline.clustering.naming import OWN_LABEL_SOURCES, LabelSource, Names, name_clusters
 
 if TYPE_CHECKING:
     from motionary.pipeline.clustering.estimator import MotionClusterer
 
 __all__ = [
+    "OWN_LABEL_SOURCES",
     "Cut",
     "CutRule",
     "LabelSource",

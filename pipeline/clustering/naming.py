@@ -17,6 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 LabelSource = Literal["override", "supplied", "propagated", "unassigned"]
 
+OWN_LABEL_SOURCES: tuple[LabelSource, ...] = ("override", "supplied")
+"""Of labels that are a clip's own."""
+
 
 @dataclass(frozen=True, eq=False)
 class Names:

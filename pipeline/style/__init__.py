@@ -2,12 +2,12 @@
 
 In reading order: `rig` (which joints belong together), `root_motion` (the root in its own heading frame),
 `residual` (clip minus reference), `space` (the principal axes of a cluster's residuals), `separability` (how
-well labels are predicted from them), `transfer` (a residual added to another clip), `contact` (how far feet
-slide while they stand, and the fastest joint).
+well labels are predicted from them), `transfer` (a residual added to another clip), `contact` (when feet
+stand, how far they slide meanwhile, and the fastest joint).
 """
 
-from motionary.pipeline.style.contact import fastest_joint, foot_sliding
-from motionary.pipeline.style.residual import Residual, ResidualKind, residual, residuals
+from motionary.pipeline.style.contact import fastest_joint, foot_sliding, standing_toes
+from motionary.pipeline.style.residual import Residual, ResidualKind, pose_differences, residual, residuals
 from motionary.pipeline.style.rig import REGIONS, joint_regions
 from motionary.pipeline.style.separability import style_accuracy
 from motionary.pipeline.style.space import StyleSpace
@@ -21,8 +21,10 @@ __all__ = [
     "fastest_joint",
     "foot_sliding",
     "joint_regions",
+    "pose_differences",
     "residual",
     "residuals",
+    "standing_toes",
     "style_accuracy",
     "transfer",
 ]

@@ -201,6 +201,25 @@ def check_same_time(motion: Motion, reference: Motion) -> None:
         )
 
 
+def pose_differences(own: FloatArray, reference: FloatArray) -> FloatArray:
+    """Subtract the poses of a reference from those of a clip in its time.
+
+    Parameters
+    ----------
+    own, reference : array (m, columns)
+        Features of pose and travel; see `motionary.pipeline.features`. Those of a clip may be of the motion
+        in the reference's time, or its own features warped.
+
+    Returns
+    -------
+    array (m, 19, 3)
+        By canonical joint, in the heading frames, leg lengths.
+    """
+    difference = own[:, :POSE_COLUMNS].astype(np.float64) - reference[:, :POSE_COLUMNS]
+    # The columns are divided by the root of the number of joints; here they are leg lengths again.
+    return difference.reshape(len(difference), -1, 3) * np.sqrt(len(CANONICAL_JOINTS))
+
+
 def _seen(motion: Motion, conventions: Sequence[Convention]) -> _Seen:
     features = features_by_frame(motion, conventions)
     return _Seen(motion, features, root_motion(motion, features))
@@ -215,10 +234,7 @@ def _rotation_residual(clip: _Seen, reference: _Seen, conventions: Sequence[Conv
 
 
 def _pose_residual(clip: _Seen, reference: _Seen, _conventions: Sequence[Convention]) -> Residual:
-    own, other = (one.features.values[:, :POSE_COLUMNS] for one in (clip, reference))
-    difference = own.astype(np.float64) - other
-    # The columns are divided by the root of the number of joints; here they are leg lengths again.
-    joints = difference.reshape(len(difference), -1, 3) * np.sqrt(len(CANONICAL_JOINTS))
+    joints = pose_differences(clip.features.values, reference.features.values)
     return Residual("pose", CANONICAL_JOINTS, CANONICAL_REGIONS, joints, _root_residual(clip, reference))
 
 

@@ -110,11 +110,11 @@ def test_a_clip_plays_beside_its_reference_and_aligned(base, page):
     wait_until(page, f"{player}.state.time > 0")
     page.evaluate(f"{player}.pause()")
     page.evaluate(f"{player}.seek(1)")
-    before = page.evaluate(f"[...{player}.positions(0)]")
+    before = page.evaluate(f"[...{player}.positions(1)]")
     page.get_by_role("button", name="Aligned").first.click()
     assert page.evaluate(f"{player}.state.aligned")
     page.evaluate(f"{player}.seek(1)")
-    assert page.evaluate(f"[...{player}.positions(0)]") != before
+    assert page.evaluate(f"[...{player}.positions(1)]") != before
 
 
 def test_one_types_is_suggested_clips_and_opens_one(base, page):
@@ -154,9 +154,11 @@ def test_keys_play_a_clip_and_tell_themselves(base, page):
     page.goto(f"{base}/search?q=walk")
     page.keyboard.press("j")
     page.keyboard.press("p")
-    page.wait_for_selector("dialog canvas")
+    page.wait_for_selector("dialog [data-playing=true]")
+    page.keyboard.press("Space")  # the player has the keys
+    page.wait_for_selector("dialog [data-playing=false]")
     page.keyboard.press("Escape")
-    assert page.query_selector("dialog") is None
+    page.wait_for_selector("dialog", state="detached")
     page.keyboard.press("?")
     assert "mark the clip for comparison" in page.inner_text("dialog")
     page.keyboard.press("j")  # nothing moves behind it

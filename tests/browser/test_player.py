@@ -127,6 +127,29 @@ def test_aligned_is_what_the_warp_says(shown, demo, pair):
     np.testing.assert_array_equal(places(page, 1, 0.5), raw)
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_pose_stays_when_the_clock_changes(shown, pair, backwards):
+    reference, clip = pair
+    if backwards:
+        clip = replace(clip, warp_times=clip.warp_times[::-1])
+    page = shown(scene([reference, clip]))
+    span = float(np.ptp(clip.warp_times))
+    for moment in (clip.warp_times.min() + span * np.array([0.1, 0.45, 0.8])).tolist():
+        call(page, f"p.set({{aligned: false}}), p.seek({moment!r})")
+        before = places(page, 1, call(page, "p.state.time"))
+        page.get_by_role("button", name="Aligned").click()
+        assert call(page, "p.state.aligned")
+        np.testing.assert_allclose(places(page, 1, call(page, "p.state.time")), before, atol=1e-4 * clip.size)
+        page.get_by_role("button", name="Aligned").click()
+        assert call(page, "p.state.time") == pytest.approx(moment, abs=1e-5)
+    # Over already, it is at its end; and what is not offered changes nothing.
+    call(page, "p.set({aligned: true}), p.seek(99), p.set({aligned: false})")
+    assert call(page, "p.state.time") == pytest.approx(clip.warp_times[-1], abs=1e-5)
+    page = shown(scene([figure_of(template("walk"))]))
+    call(page, "p.seek(.5), p.set({aligned: true})")
+    assert call(page, "p.state.time") == 0.5
+
+
 def test_plays_pauses_and_scrubs(shown):
     page = shown(scene([figure_of(template("walk"))]))
     page.get_by_role("button", name="Play", exact=True).click()
@@ -149,6 +172,7 @@ def test_plays_pauses_and_scrubs(shown):
 
 def test_every_key_does_what_the_help_says(shown, pair):
     page = shown(scene(pair))
+    call(page, "p.set({inPlace: false})")
     canvas = page.locator("#p0 canvas")
     canvas.focus()
     page.keyboard.press("?")
@@ -191,6 +215,7 @@ def test_every_key_does_what_the_help_says(shown, pair):
 
 def test_figures_in_place_and_followed_ones_stay_in_view(shown, pair):
     page = shown(scene(pair, layout="overlaid"))
+    call(page, "p.set({inPlace: false})")
     hips = "p.figures.map((one) => [...one.drawnJoint(one.ownTime(p.duration / 2, false), 0)])"
     first, second = np.array(call(page, hips))
     assert np.hypot(*(first - second)[[0, 2]]) > 0.05
@@ -247,11 +272,38 @@ def test_what_makes_no_sense_is_not_offered(shown, pair):
         page.get_by_role("button").all_text_contents()
     )
     strangers = [pair[1], replace(pair[0], reference="another")]
-    for figures in (strangers, [pair[0]]):  # to two references; a reference alone
+    unnamed = figure_of(template("walk"))
+    unwarped = replace(pair[1], warp_times=None)
+    # To two references; a reference alone; one with a time of its own beside others.
+    for figures in (strangers, [pair[0]], [unnamed, pair[1]], [*pair, unnamed], [pair[0], unwarped]):
         page = shown(scene(figures))
         assert "Aligned" not in page.get_by_role("button").all_text_contents()
-    page = shown(scene([pair[1]]))
-    assert "Aligned" in page.get_by_role("button").all_text_contents()
+    by_hand = replace(pair[1], clip_id=None, reference=None)
+    # Alone; beside its reference, which needs no warp to itself; to a reference without a name.
+    for figures in ([pair[1]], [replace(pair[0], warp_times=None), pair[1]], [by_hand]):
+        page = shown(scene(figures))
+        assert "Aligned" in page.get_by_role("button").all_text_contents()
+
+
+def test_the_legend_tells_which_is_the_reference_and_the_frame_of_each_file(shown, pair):
+    page = shown(scene(pair))
+    reference, member = page.locator(".motionary-player li").all_inner_texts()
+    assert "reference" in reference
+    assert "reference" not in member
+    figure = pair[1]
+    for frame in (0, 1, figure.frames // 2):
+        call(page, f"p.seek({frame / figure.fps!r})")
+        told = f"frame {round(frame / figure.fps * figure.source_fps)} at {figure.source_fps:g}/s"
+        assert told in page.locator(".motionary-player li").nth(1).inner_text()
+
+
+def test_esc_closes_the_list_of_keys(shown, pair):
+    page = shown(scene(pair))
+    page.locator("canvas").click()
+    page.keyboard.press("?")
+    assert page.get_by_text("play or pause").is_visible()
+    page.keyboard.press("Escape")
+    assert not page.get_by_text("play or pause").is_visible()
 
 
 def test_the_camera_keeps_figures_large(shown):
@@ -282,7 +334,7 @@ def test_residual_and_contacts_follow_their_frames(shown, pair):
         found = call(page, f"{figures}.referenceFrame(99, {own!r}, false)")
         assert figure.warp_times[found] == pytest.approx(own, abs=1e-6)
         got = call(page, f"{figures}.joints.map((_, joint) => {figures}.heatAt({frame}, joint))")
-        np.testing.assert_allclose(got, figure.residual[frame], atol=figure.residual.max() / 509)
+        np.testing.assert_allclose(got, figure.residual[frame] / 255 * figure.residual_max, rtol=1e-9)
     for frame in range(0, figure.frames, 5):
         standing = call(page, f"{figures}.standing({frame / figure.fps!r})")
         assert standing == [joint for joint, on in figure.contacts.items() if on[frame]]
@@ -336,7 +388,7 @@ def test_still_players_do_not_draw_and_one_loop_serves_all(page, shown):
     shown(walk, walk, walk, after='<div style="height: 4000px"></div>')
     page.evaluate("scrollTo(0, 400)")
     page.wait_for_function("[0, 1].every((k) => document.getElementById(`p${k}`).player)")
-    # Playwright's own waiting for a condition asks for frames as well; waiting for a time does not.
+    # Playwright's own waiting for a condition asks for frames as well, unless it looks at intervals.
     page.wait_for_timeout(200)
     page.evaluate("window.asked = 0")
     page.wait_for_timeout(200)
@@ -344,11 +396,12 @@ def test_still_players_do_not_draw_and_one_loop_serves_all(page, shown):
     counted = """(p) => { p.draws = 0; const draw = p.draw.bind(p);
         p.draw = () => { p.draws++; draw(); }; p.play(); }"""
     page.evaluate(f"[0, 1].forEach((k) => ({counted})(document.getElementById(`p${{k}}`).player))")
-    page.wait_for_timeout(500)
+    page.wait_for_function(
+        "[0, 1].every((k) => document.getElementById(`p${k}`).player.draws > 5)", polling=50
+    )
     asked, *draws = page.evaluate(
         "[window.asked, ...[0, 1].map((k) => document.getElementById(`p${k}`).player.draws)]"
     )
-    assert min(draws) > 1
     assert asked <= max(draws) + 2
     page.evaluate("scrollTo(0, 3900)")
     page.wait_for_function(
@@ -434,8 +487,8 @@ def test_notebook_page_plays_in_its_frame(page, tmp_path):
     frame.get_by_role("button", name="Play", exact=True).click()
     frame.get_by_role("button", name="Pause").wait_for()
     clock = frame.locator(".clock")
-    page.wait_for_timeout(300)
-    assert re.match(r"0\.\d\d / ", clock.inner_text())
+    page.frames[1].wait_for_function("document.querySelector('.motionary-player').player.time >= .01")
+    assert re.match(r"\d\.\d\d / ", clock.inner_text())
     assert not clock.inner_text().startswith("0.00")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.style import fastest_joint, foot_sliding
+from motionary.pipeline.style import fastest_joint, foot_sliding, standing_toes
 from motionary.pipeline.style.root_motion import features_by_frame
 from motionary.pipeline.synthetic import BODIES, synthetic_library, template
 from tests.style.figures import moved, performed
@@ -63,6 +63,38 @@ def test_nothing_slides_where_nothing_stands():
     )
     flying = motion.root_position + [[0, 0, 0], [50, 100, 0]]
     assert foot_sliding(replace(motion, root_position=flying)) == 0
+
+
+def test_standing_toes_against_a_frame_at_a_time():
+    motion = performed("run", "tired", "chidi", frames=70)
+    toes = [motion.positions()[:, motion.skeleton.index(f"{side}ToeBase")] for side in ("Left", "Right")]
+    leg = features_by_frame(motion).leg_length
+    limit = np.percentile([min(toes[0][k, 1], toes[1][k, 1]) for k in range(70)], 2) + 2.5 / 90 * leg
+    expected = np.zeros((70, 2), bool)
+    for side, toe in enumerate(toes):
+        for k in range(70):
+            before, after = max(k - 1, 0), min(k + 1, 69)
+            speed = math.dist(toe[after], toe[before]) / (after - before) * motion.fps
+            expected[k, side] = toe[k, 1] <= limit and speed <= 0.6 * leg
+    found = standing_toes(motion)
+    np.testing.assert_array_equal(found, expected)
+    assert (0.05 < found.mean(axis=0)).all()
+    assert (found.mean(axis=0) < 0.95).all()
+
+
+def test_a_low_toe_that_slides_does_not_stand():
+    still = performed("wave", body="bea", frames=61)
+    assert standing_toes(still).all()
+    leg = features_by_frame(still).leg_length
+    for speed, stands in ((0.5, True), (0.7, False)):  # leg lengths a second
+        along = np.multiply.outer(np.arange(61) / 30 * speed * leg, [0.6, 0.0, 0.8])
+        found = standing_toes(replace(still, root_position=still.root_position + along))
+        assert (found == stands).all()
+
+
+def test_toes_of_a_single_frame_stand_where_they_are_low():
+    one = performed("wave", frames=2).sampled([0.0])
+    assert standing_toes(one).tolist() == [[True, True]]
 
 
 def test_real_walkers_slide_a_little(shared_data: Path):

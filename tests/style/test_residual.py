@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention
 from motionary.pipeline.motion import Motion
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.style import REGIONS, joint_regions, residual, residuals
+from motionary.pipeline.style import REGIONS, joint_regions, pose_differences, residual, residuals
+from motionary.pipeline.style.root_motion import features_by_frame
 from motionary.pipeline.synthetic import ACTIONS
 from motionary.pipeline.synthetic.conventions import CMU_BVH
 from tests.style.figures import moved, performed, renamed, shaken
@@ -140,6 +141,16 @@ def test_other_rigs_are_compared_by_pose():
     )
     height = same.root[:, 3]
     np.testing.assert_allclose(same.joints[:, head, 1], one - other + height, atol=1e-5)
+
+
+def test_poses_differ_by_their_joints_in_leg_lengths():
+    own, other = (features_by_frame(performed("walk", style, frames=12)) for style in ("tired", "proud"))
+    found = pose_differences(own.values, other.values)
+    assert (found.shape, found.dtype) == ((12, 19, 3), np.float64)
+    for frame in range(12):
+        for joint in range(19):
+            one, two = (x.values[frame, 3 * joint : 3 * joint + 3].astype(float) for x in (own, other))
+            np.testing.assert_allclose(found[frame, joint], (one - two) * math.sqrt(19), rtol=1e-12)
 
 
 def test_a_cluster_of_several_rigs_is_compared_by_pose_throughout():

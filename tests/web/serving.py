@@ -13,7 +13,7 @@ import uvicorn
 
 from motionary.catalog.web.access import Guard
 from motionary.catalog.web.app import create_app
-from motionary.catalog.web.edits import Editor
+from motionary.catalog.web.desk import Editor
 from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.browse import LabelEditor
 from motionary.workflows.main_job import run

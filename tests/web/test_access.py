@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionary.catalog import Catalog
-from motionary.catalog.web import pages
+from motionary.catalog.web import data, drop, pages
 from motionary.catalog.web.access import Guard
 from motionary.catalog.web.app import create_app
 from tests.web.serving import copied, editor_of, served, tree
@@ -123,7 +123,13 @@ def test_every_answer_forbids_frames_foreign_scripts_and_guessing(client, strang
         raise RuntimeError("of a test")
 
     monkeypatch.setattr(pages, "clusters_of", fail)
-    answers.append(client.get("/clusters"))
+    monkeypatch.setattr(data, "thumbnail_svg", fail)
+    monkeypatch.setattr(drop, "_sent", fail)  # of an answer that is a coroutine
+    alone = {"Connection": "close"}  # a connection on which something failed is closed
+    asked = (("GET", "/clusters"), ("GET", f"/data/thumbnail?clip={CLIP}"), ("POST", "/drop"))
+    faults = [client.request(*one, headers=alone) for one in asked]
+    assert [one.status_code for one in faults] == [500] * 3
+    answers += faults
     assert {one.status_code for one in answers} == {200, 404, 421, 403, 401, 500}
     for one in answers:
         policy = one.headers["Content-Security-Policy"]

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from motionary.catalog import Catalog
+from motionary.catalog import Catalog, CatalogError
 from motionary.catalog.web import drop
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.readers.markers import MARKER_SETS, terms_of
@@ -141,8 +141,8 @@ BAD = [
     ([("take.bvh", b"")], 422, "It cannot be looked at"),
     ([("take.npz", b"PK\x05\x06" + bytes(18))], 422, "It cannot be looked at"),
     ([("take.c3d", b"\x02P" + bytes(510))], 422, "It cannot be looked at"),
-    ([("take.zip", b"PK")], 415, "1 files were given, of which 0 are motions"),
-    ([("take", b"x")], 415, "of which 0 are motions"),
+    ([("take.zip", b"PK")], 415, ".zip is not read here"),
+    ([("take", b"x")], 415, "such a file is not read here"),
     ([("a.bvh", b"x"), ("b.bvh", b"x")], 415, "of which 2 are motions"),
     ([("a.amc", b"x")], 415, "an AMC came without its ASF"),
     ([("a.bvh", b"x"), ("a.asf", b"x")], 415, "an ASF came with a BVH"),
@@ -157,6 +157,22 @@ def test_what_cannot_be_looked_at_is_told_with_its_mend(client, temporary, files
     assert (answer.status_code, told in answer.text) == (status, True), answer.text
     assert str(temporary) not in answer.text
     assert "dropped-scene" not in answer.text
+
+
+@pytest.mark.parametrize("listed", ["[" * 20_000, '[{"name": "a.bvh", "size": 1e400}]'])
+def test_a_list_of_files_that_is_none_is_told(client, listed):
+    headers = {"X-Motionary-Files": quote(listed), "Origin": str(client.base_url).rstrip("/")}
+    answer = client.post("/drop", content=b"x", headers=headers)
+    assert (answer.status_code, "names and sizes" in answer.text) == (400, True)
+
+
+def test_a_name_that_no_file_can_have_harms_nothing(client):
+    headers = {
+        "X-Motionary-Files": quote('[{"name": "\\ud800.bvh", "size": 1}]'),
+        "Origin": str(client.base_url).rstrip("/"),
+    }
+    answer = client.post("/drop", content=b"x", headers=headers)
+    assert (answer.status_code, "cannot be looked at" in answer.text) == (422, True)
 
 
 def test_a_skeleton_that_no_convention_fits_can_be_played(client):
@@ -280,6 +296,36 @@ def test_one_is_read_at_a_time(client, demo_library, monkeypatch):
     for one in threads:
         one.join()
     assert most == 1
+
+
+def test_a_store_that_is_slow_keeps_no_other_page_waiting(client, demo_library, monkeypatch):
+    """What a dropped file is compared with is opened in a thread, not where all requests are taken."""
+    asked, answers = threading.Event(), threading.Event()
+    opened = drop.shown_to
+
+    def slow(request):
+        asked.set()
+        assert answers.wait(30)
+        return opened(request)
+
+    monkeypatch.setattr(drop, "shown_to", slow)
+    thread = threading.Thread(target=sent, args=(client, ("a.bvh", (demo_library / WALK).read_bytes())))
+    thread.start()
+    try:
+        assert asked.wait(30)
+        assert client.get("/static/style.css", timeout=10).status_code == 200
+    finally:
+        answers.set()
+        thread.join()
+
+
+def test_a_damaged_catalog_is_not_one_without_clips(demo_catalog, demo_library, monkeypatch, client):
+    def damaged(*given):
+        raise CatalogError("a part is damaged")
+
+    monkeypatch.setattr(drop, "_compared", damaged)
+    answer = sent(client, ("a.bvh", (demo_library / WALK).read_bytes()))
+    assert (answer.status_code, "a part is damaged" in answer.text) == (500, True)
 
 
 def test_too_long_a_motion_is_refused_by_both_numbers(client, demo_library, monkeypatch):

@@ -1,6 +1,9 @@
 """Labels set from the pages and taken back: exactly, one by one, and never over what somebody else did."""
 
+import json
+import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import fsspec
@@ -9,6 +12,7 @@ import pytest
 from motionary.catalog import Catalog
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.store import Store
+from motionary.catalog.web.desk import Desk, Edit, Relabel, Undo
 from motionary.catalog.writer_lock import the_only_writer
 from motionary.workflows.relabel import relabel
 from tests.web.serving import copied, editor_of, served
@@ -109,6 +113,40 @@ def test_undo_of_an_earlier_edit_alone(client, url):
     assert labels(url) == {RUN: "b"}
 
 
+def test_undo_of_an_earlier_edit_waits_for_the_later_one_of_the_clip(client, url):
+    first = label(client, WALK, "one")["undo"]["edit"]
+    second = label(client, WALK, "two")["undo"]["edit"]
+    answer = undo(client, first)
+    assert (answer.status_code, "take that back first" in answer.json()["error"]) == (409, True)
+    assert [undo(client, one).status_code for one in (second, first)] == [200, 200]
+    assert labels(url) == {}
+
+
+def test_one_bad_wish_leaves_the_others_of_its_publication_alone(url):
+    """Three come while one is published, so they go together."""
+    inner, begun, go_on = editor_of(url), threading.Event(), threading.Event()
+
+    class Slow:
+        user = "ada"
+
+        def publish(self, changed) -> None:
+            begun.set()
+            assert go_on.wait(60)
+            inner.publish(changed)
+
+    with served(url, editor=Slow()) as client, ThreadPoolExecutor(4) as threads:
+        asked = [threads.submit(client.post, "/edit/relabel", json={"clip": WALK, "label": "a"})]
+        assert begun.wait(60)
+        for clip in ("\ud800", RUN, JUMP):
+            body = json.dumps({"clip": clip, "label": "b"})
+            headers = {"Content-Type": "application/json"}
+            asked.append(threads.submit(client.post, "/edit/relabel", content=body, headers=headers))
+        time.sleep(0.5)  # they are on their way; were one late, it would be published on its own
+        go_on.set()
+        assert [one.result().status_code for one in asked] == [200, 404, 200, 200]
+    assert labels(url) == {WALK: "a", RUN: "b", JUMP: "b"}
+
+
 @pytest.mark.parametrize("theirs", ["stroll", None])
 def test_what_somebody_else_changed_meanwhile_is_not_undone(client, url, theirs):
     first = label(client, RUN, "jog")["undo"]["edit"]
@@ -130,6 +168,12 @@ def test_the_same_label_set_by_somebody_else_is_theirs(client, url):
     relabel(url, {WALK: None}, "grace").close()
     relabel(url, {WALK: "trudge"}, "grace").close()
     assert undo(client, edit).status_code == 409
+
+
+def test_json_without_an_end_is_told(client):
+    headers = {"Content-Type": "application/json"}
+    answer = client.post("/edit/relabel", content="[" * 60_000, headers=headers)
+    assert (answer.status_code, "no JSON object" in answer.json()["error"]) == (400, True)
 
 
 def test_nothing_is_undone_twice(client):
@@ -243,6 +287,63 @@ def test_a_publication_that_fails_is_told_and_the_next_one_works(url, error):
         assert answer.json()["undo"] is None
         editor.publish = editor.inner.publish
         assert label(client, WALK, "a")["label"] == "a"
+
+
+def test_a_fault_of_ours_is_told_and_logged_and_answers_all_who_wait(url, caplog):
+    class Faulty(Slow):
+        def publish(self, changed) -> None:
+            self.published += 1
+            self.begun.set()
+            assert self.go_on.wait(30)
+            if self.published == 2:
+                raise KeyError("of a test")
+            self.inner.publish(changed)
+
+    editor = Faulty(url)
+    with served(url, editor=editor) as client, ThreadPoolExecutor(3) as threads:
+
+        def ask(clip: str):
+            return client.post("/edit/relabel", json={"clip": clip, "label": "a"})
+
+        first = threads.submit(ask, WALK)
+        assert editor.begun.wait(30)
+        others = [threads.submit(ask, one) for one in (RUN, JUMP)]
+        threading.Event().wait(0.5)  # for the others to arrive
+        editor.go_on.set()
+        assert first.result().status_code == 200
+        answers = [one.result() for one in others]
+        assert ask(RUN).status_code == 200
+    assert [one.status_code for one in answers] == [500] * 2
+    assert all("motionary failed: KeyError" in one.json()["error"] for one in answers)
+    assert answers[0].json()["undo"]["clip"] == WALK
+    assert [one.exc_info[0] for one in caplog.records if one.name.endswith("web.desk")][0] is KeyError
+
+
+@pytest.fixture
+def threads_change_often():
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_the_latest_change_is_read_while_others_are_made(url, threads_change_often):
+    desk = Desk(editor_of(url))
+    ended = threading.Event()
+
+    def change() -> None:
+        while not ended.is_set():
+            desk._note(Relabel(WALK, "a"), Edit(WALK, None, {"label": "a"}))
+            desk._note(Undo(desk._number), Edit(WALK, {"label": "a"}, None))
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    try:
+        for _ in range(20_000):
+            assert desk.last is None or desk.last["clip"] == WALK
+    finally:
+        ended.set()
+        thread.join()
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ def report(
         typer.Option(
             "--against",
             metavar="RUN",
-            help="Tell what changed since this run, or snapshot's number.",
+            help="Tell what changed since this earlier run, or snapshot's number.",
             show_default="the newest earlier snapshot that is left",
         ),
     ] = None,
@@ -53,6 +53,8 @@ def report(
         write_json(asdict(made))
         return
     since = (
-        f"changes since snapshot {made.against}" if made.against else "no earlier snapshot to compare with"
+        f"changes since snapshot {made.against}"
+        if made.against
+        else "no earlier snapshot that can be compared with"
     )
     print(f"wrote {made.file}: {made.bytes / 1e6:.1f} MB, snapshot {made.snapshot}, {since}")

@@ -37,30 +37,31 @@ def _chart(figure: go.Figure, name: str) -> str:
 
 
 def _walks(catalog: Catalog) -> str:
-    return _player(catalog, *WALKS)
+    return _player(catalog, "walks", *WALKS)
 
 
 def _runs(catalog: Catalog) -> str:
-    return _player(catalog, *RUNS)
+    return _player(catalog, "runs", *RUNS)
 
 
 def _aligned_pair(catalog: Catalog) -> str:
     reference, clip = _most_gained(catalog)
-    return _player(catalog, reference, clip, aligned=True)
+    return _player(catalog, "aligned-pair", reference, clip, aligned=True)
 
 
 def _residual(catalog: Catalog) -> str:
     reference, clip = _most_gained(catalog)
-    return _player(catalog, reference, clip, aligned=True, colour="residual")
+    return _player(catalog, "residual", reference, clip, aligned=True, colour="residual")
 
 
-def _player(catalog: Catalog, *clip_ids: str, aligned: bool = False, colour: Colour = "plain") -> str:
+def _player(
+    catalog: Catalog, name: str, *clip_ids: str, aligned: bool = False, colour: Colour = "plain"
+) -> str:
     from motionary.catalog.views.figures import clip_figure, scene
     from motionary.catalog.views.player import player_html
 
     figures = [clip_figure(catalog, clip_id, slim=True) for clip_id in clip_ids]
-    name = "-".join(["player", *("aligned" * aligned, colour)])
-    return player_html(scene(figures, aligned=aligned, colour=colour), name=name)
+    return player_html(scene(figures, aligned=aligned, colour=colour), name=f"picture-{name}")
 
 
 def _dendrogram(catalog: Catalog) -> go.Figure:

@@ -10,10 +10,19 @@ from statistics import median
 from typing import Any
 
 from motionary.catalog.query import Catalog
-from motionary.catalog.views.cluster_table import cluster_table
-from motionary.catalog.views.page import Cell, Html, details, isolated, section, table
+from motionary.catalog.views.cluster_table import cluster_members, cluster_table
+from motionary.catalog.views.page import details, isolated
 from motionary.catalog.views.report.footage import Footage
-from motionary.catalog.views.sections import cluster_mark, left_out
+from motionary.catalog.views.sections import (
+    cluster_mark,
+    clusters_section,
+    clusters_table,
+    left_out,
+    members_table,
+    no_clusters_section,
+    purity_text,
+)
+from motionary.pipeline.clustering import OWN_LABEL_SOURCES
 
 MOST_CARDS = 60
 _MOST_CLUSTERS = 500
@@ -50,23 +59,26 @@ class ClusterCard:
             return {"reference": reference, "other": others[0]}
         return {"reference": reference, "tightest": others[0], "loosest": others[-1]}
 
+    def played(self, role: str) -> list[str]:
+        """List the clips that a take's picture plays: itself, beside the reference."""
+        return list(dict.fromkeys([self.row["reference"], self.takes[role]["clip_id"]]))
+
 
 def cluster_cards(catalog: Catalog) -> list[ClusterCard]:
     """Gather the clusters, the largest first."""
     clips = catalog.clips.to_arrow().select(["clip_id", "seconds"])
     seconds = dict(zip(clips["clip_id"].to_pylist(), clips["seconds"].to_pylist(), strict=True))
-    members: dict[int, list[dict]] = {}
-    order = [("is_reference", "descending"), ("distance_to_reference", "ascending"), ("clip_id", "ascending")]
-    for clip in catalog.clusters.to_arrow().sort_by(order).to_pylist():
-        found = members.setdefault(clip["cluster_id"], [])
-        found.append(clip | {"seconds": seconds[clip["clip_id"]]})
+    members = {
+        cluster_id: [clip | {"seconds": seconds[clip["clip_id"]]} for clip in inside]
+        for cluster_id, inside in cluster_members(catalog).items()
+    }
     return [ClusterCard(row, members[row["cluster_id"]]) for row in cluster_table(catalog).to_pylist()]
 
 
 def takes_by_importance(cards: Sequence[ClusterCard]) -> Iterator[str]:
-    """List the clips that the cards show: every reference, then what lies far from it, then near."""
+    """List the clips that are shown on cards: every reference, then what lies far from it, then near."""
     for role in ("reference", "loosest", "other", "tightest"):
-        yield from (card.takes[role]["clip_id"] for card in cards if role in card.takes)
+        yield from (card.takes[role]["clip_id"] for card in cards[:MOST_CARDS] if role in card.takes)
 
 
 def cards_section(cards: Sequence[ClusterCard], footage: Footage) -> str:
@@ -80,44 +92,25 @@ def cards_section(cards: Sequence[ClusterCard], footage: Footage) -> str:
         Of the takes of the first `MOST_CARDS`.
     """
     if not cards:
-        return section("Clusters", "No clip could be read, so there is nothing to cluster.", name="clusters")
-    notes = []
-    if len(cards) > MOST_CARDS:
-        notes.append(f"Only the {MOST_CARDS} largest of the {len(cards):,} clusters are shown below.")
-    if footage.without_figure:
-        notes.append(
-            f"{footage.without_figure} takes are too long for this page to hold: they are pictures only."
-        )
+        return no_clusters_section()
+    shown, notes = cards[:MOST_CARDS], []
+    if len(cards) > len(shown):
+        notes.append(f"Only the {len(shown)} largest of the {len(cards):,} clusters are shown below.")
+    no_room = footage.no_room(card.played(role) for card in shown for role in card.takes)
+    if no_room:
+        notes.append(no_room)
     if notes:
         notes.append("motionary browse CATALOG plays every clip.")
-    return section(
-        "Clusters",
-        "Clips that move alike. Labelled are those with a label of their own, and purity is the share of "
-        "the commonest of these; the reference is the clip that the others are aligned to. Press a picture "
-        "to play it beside the reference; Aligned shows both in the reference's time.",
-        f'<p class="quiet">{escape(" ".join(notes))}</p>' if notes else "",
-        details(f"All {len(cards):,} in a table" if len(cards) > 1 else "In a table", _all_clusters(cards)),
-        *(_card(card, footage) for card in cards[:MOST_CARDS]),
-        name="clusters",
-    )
-
-
-def _all_clusters(cards: Sequence[ClusterCard]) -> str:
-    rows: list[list[Cell]] = [
-        [
-            cluster_mark(card.number),
-            card.number,
-            _link(card) if place < MOST_CARDS else isolated(card.row["label"] or "unnamed"),
-            card.row["size"],
-            card.row["labelled"],
-            _purity(card),
-            isolated(card.row["reference"]),
-        ]
-        for place, card in enumerate(cards[:_MOST_CLUSTERS])
-    ]
-    columns = ["", "cluster", "name", "clips", "labelled", "purity", "reference"]
+    rows = [card.row for card in cards[:_MOST_CLUSTERS]]
     more = left_out(len(cards) - len(rows), "clusters", 'from \\"references\\" order by size desc')
-    return table(columns, rows) + more
+    listed = clusters_table(rows, {card.number for card in shown}) + more
+    return clusters_section(
+        f'<p class="quiet">{escape(" ".join(notes))}</p>' if notes else "",
+        details(f"All {len(cards):,} in a table" if len(cards) > 1 else "In a table", listed),
+        *(_card(card, footage) for card in shown),
+        further=" Press a picture to play it beside the reference; Aligned shows both in the reference's "
+        "time.",
+    )
 
 
 def _card(card: ClusterCard, footage: Footage) -> str:
@@ -133,18 +126,17 @@ def _card(card: ClusterCard, footage: Footage) -> str:
 
 
 def _take(card: ClusterCard, role: str, clip: dict, footage: Footage) -> str:
-    reference, clip_id = card.row["reference"], clip["clip_id"]
+    clip_id = clip["clip_id"]
+    said = f"Play the {role} clip beside the reference: {clip_id}"
     if role == "reference":
-        said, played = f"Play the reference, {clip_id}", [clip_id]
-    else:
-        said, played = f"Play the {role} clip beside the reference: {clip_id}", [reference, clip_id]
+        said = f"Play the reference, {clip_id}"
     known = [f"{clip['seconds']:.1f} s"]
     if role != "reference":
         known.append(f"at {clip['distance_to_reference']:.3f}")
     if clip["label"] != card.row["label"]:
         known.append(f"called <bdi>{escape(clip['label'])}</bdi>" if clip["label"] else "without a name")
     caption = f'<strong>{role}</strong> <span class="quiet">{", ".join(known)}</span>'
-    button = footage.button(f"cluster-{card.number}-stage", said, caption, *played)
+    button = footage.button(f"cluster-{card.number}-stage", said, caption, *card.played(role))
     return f'<div class="seen">{button}{isolated(clip_id).text}</div>'
 
 
@@ -153,9 +145,9 @@ def _summary(card: ClusterCard) -> str:
     size = len(card.members)
     seconds = median(one["seconds"] for one in card.members)
     told = [f"{size:,} clips, {seconds:.1f} s on median" if size > 1 else f"1 clip of {seconds:.1f} s"]
-    own = [one["label"] for one in card.members if one["label_source"] in ("override", "supplied")]
+    own = [one["label"] for one in card.members if one["label_source"] in OWN_LABEL_SOURCES]
     if own:
-        told.append(f"{len(own):,} labelled, purity {_purity(card)}")
+        told.append(f"{len(own):,} labelled, purity {purity_text(card.row)}")
     if len(set(own)) > 1:
         counted = Counter(own).most_common(6)
         told.append(", ".join(f"<bdi>{escape(label)}</bdi> {count:,}" for label, count in counted))
@@ -170,27 +162,8 @@ def _members(card: ClusterCard) -> str:
     size = len(card.members)
     if size == 1:
         return ""
-    rows: list[list[Cell]] = [
-        [
-            Html(isolated(one["clip_id"]).text + (" (reference)" if one["is_reference"] else "")),
-            isolated(one["label"] or "none"),
-            one["label_source"],
-            f"{one['confidence']:.2f}",
-            one["distance_to_reference"],
-        ]
-        for one in card.members[:_MOST_MEMBERS]
-    ]
+    shown = card.members[:_MOST_MEMBERS]
     query = f"select * from clusters where cluster_id = {card.number} order by distance_to_reference"
-    more = left_out(size - len(rows), "clips", query)
-    title = f"The {len(rows)} nearest of {size:,} clips" if more else f"All {size:,} clips"
-    return details(
-        title, table(["clip", "label", "from", "confidence", "distance to reference"], rows) + more
-    )
-
-
-def _link(card: ClusterCard) -> Html:
-    return Html(f'<a href="#cluster-{card.number}">{isolated(card.row["label"] or "unnamed").text}</a>')
-
-
-def _purity(card: ClusterCard) -> str:
-    return "-" if card.row["purity"] is None else f"{card.row['purity']:.2f}"
+    more = left_out(size - len(shown), "clips", query)
+    title = f"The {len(shown)} nearest of {size:,} clips" if more else f"All {size:,} clips"
+    return details(title, members_table(shown) + more)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from motionary.catalog.history import diff
+from motionary.catalog.errors import CatalogError
+from motionary.catalog.history import Difference, diff
 from motionary.catalog.query import Catalog
+from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.views.page import Cell, Html, details, facts, isolated, section, table
 from motionary.catalog.views.sections import left_out
 
@@ -18,58 +22,73 @@ _NAME, _TITLE = "changes", "What changed"
 Row = dict[str, Any]
 
 
-def changes_section(catalog: Catalog, before: Catalog | None) -> str:
-    """Tell what changed since `before`, or what the catalog still knows of that where it is gone."""
-    if before is None:
+@dataclass(frozen=True, eq=False)
+class Since:
+    """An earlier snapshot, and what changed since.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        The earlier one.
+    changes : Difference or str
+        Or why nothing can be told: what of it cannot be read.
+    """
+
+    snapshot: Snapshot
+    changes: Difference | str
+
+
+def changes_since(catalog: Catalog, before: Catalog) -> Since:
+    """Tell what changed since a snapshot that somebody chose.
+
+    Raises
+    ------
+    CatalogError
+        A file of either is damaged.
+    """
+    return Since(before.snapshot, diff(before, catalog))
+
+
+def changes_since_last(catalog: Catalog) -> Since | None:
+    """Tell what changed since the newest snapshot that is older than a catalog's own; None: none is left."""
+    earlier = [one for one in catalog.snapshots() if int(one) < int(catalog.snapshot.snapshot_id)]
+    for snapshot_id in reversed(earlier):
+        with suppress(CatalogError), Catalog.open(catalog.store.url, snapshot_id) as before:
+            # What suppress passes over is a manifest that was vacuumed since, or cannot be read.
+            try:
+                return changes_since(catalog, before)
+            except (CatalogError, OSError) as error:  # a part that this snapshot no longer needs
+                return Since(before.snapshot, str(error))
+    return None
+
+
+class _Kind(NamedTuple):
+    """A kind of change: its attribute of `Difference`, what it is called, and how its rows are shown."""
+
+    name: str
+    title: str
+    columns: Sequence[str]
+    cells: Callable[[Row], list[Cell]]
+
+
+def changes_section(catalog: Catalog, since: Since | None) -> str:
+    """Show what changed, or what the catalog still knows of it where the earlier snapshot is gone."""
+    if since is None:
         return _without_snapshot(catalog)
-    changes = diff(before, catalog)
-    kinds: list[tuple[str, str, pa.Table, Sequence[str], Callable[[Row], list[Cell]]]] = [
-        ("added", "added", changes.added, ["clip"], lambda row: [_clip(row)]),
-        ("removed", "removed or set aside", changes.removed, ["clip"], lambda row: [_clip(row)]),
-        (
-            "renamed",
-            "renamed",
-            changes.renamed,
-            ["clip", "was called"],
-            lambda row: [_clip(row), isolated(row["previous_clip_id"])],
-        ),
-        ("changed", "changed", changes.changed, ["clip"], lambda row: [_clip(row)]),
-        (
-            "moved",
-            "moved to another cluster",
-            changes.moved,
-            ["clip", "from cluster", "to cluster"],
-            lambda row: [_clip(row), row["previous_cluster_id"], row["cluster_id"]],
-        ),
-        (
-            "relabelled",
-            "with another name",
-            changes.relabelled,
-            ["clip", "was", "is", "by"],
-            lambda row: [_clip(row), _name(row["previous_label"]), _name(row["label"]), row["label_source"]],
-        ),
-        (
-            "reference",
-            "references replaced",
-            changes.references,
-            ["cluster", "was", "is"],
-            lambda row: [row["cluster_id"], isolated(row["previous_clip_id"]), _clip(row)],
-        ),
-    ]  # fmt: skip
-    then = f"Since snapshot {before.snapshot.snapshot_id} of {before.snapshot.created_at[:10]}"
-    if not any(len(found) for _, _, found, _, _ in kinds):
-        return section(_TITLE, f"{then}: nothing.", _lineage(catalog, before), name=_NAME)
-    query = f"motionary diff CATALOG {before.snapshot.snapshot_id} {catalog.snapshot.snapshot_id}"
+    earlier, changes = since.snapshot.snapshot_id, since.changes
+    then = f"snapshot {earlier} of {since.snapshot.created_at[:10]}"
+    if isinstance(changes, str):
+        said = f"What changed since {then} cannot be told, for it cannot be read: {changes}"
+        return section(_TITLE, said, _lineage(catalog, earlier), name=_NAME)
+    found = [(kind, getattr(changes, kind.name)) for kind in _KINDS]
+    if not any(len(rows) for _, rows in found):
+        return section(_TITLE, f"Since {then}: nothing.", _lineage(catalog, earlier), name=_NAME)
     return section(
         _TITLE,
-        f"{then}; {query} lists all of it.",
-        facts([(title, len(found)) for _, title, found, _, _ in kinds]),
-        _lineage(catalog, before),
-        *(
-            details(f"{len(found):,} {title}", _rows(found, columns, cells))
-            for _, title, found, columns, cells in kinds
-            if len(found)
-        ),
+        f"Since {then}; motionary diff CATALOG {earlier} {catalog.snapshot.snapshot_id} lists all of it.",
+        facts([(kind.title, len(rows)) for kind, rows in found]),
+        _lineage(catalog, earlier),
+        *(details(f"{len(rows):,} {kind.title}", _rows(rows, kind)) for kind, rows in found if len(rows)),
         name=_NAME,
     )
 
@@ -91,8 +110,8 @@ def _without_snapshot(catalog: Catalog) -> str:
     )
 
 
-def _lineage(catalog: Catalog, before: Catalog) -> str:
-    """Say which clusters came, went, split or merged since."""
+def _lineage(catalog: Catalog, earlier: str) -> str:
+    """Say which clusters came, went, split or merged since a snapshot."""
     told = {
         "new": "cluster {cluster_id} is new",
         "gone": "cluster {previous_id} is gone",
@@ -100,7 +119,7 @@ def _lineage(catalog: Catalog, before: Catalog) -> str:
         "merged": "cluster {previous_id} went into {cluster_id} with {clips} clips",
     }
     rows = catalog.lineage.to_arrow().to_pylist()
-    since = [row for row in rows if row["event"] in told and row["after"] >= before.snapshot.snapshot_id]
+    since = [row for row in rows if row["event"] in told and row["after"] >= earlier]
     if not since:
         return ""
     lines = [f"<li>{told[row['event']].format(**row)}</li>" for row in since[:MOST_ROWS]]
@@ -108,10 +127,10 @@ def _lineage(catalog: Catalog, before: Catalog) -> str:
     return f'<ul class="events">{"".join(lines)}</ul>{more}'
 
 
-def _rows(found: pa.Table, columns: Sequence[str], cells: Callable[[Row], list[Cell]]) -> str:
-    shown = [cells(row) for row in found[:MOST_ROWS].to_pylist()]
+def _rows(found: pa.Table, kind: _Kind) -> str:
+    shown = [kind.cells(row) for row in found[:MOST_ROWS].to_pylist()]
     more = len(found) - len(shown)
-    return table(columns, shown) + (f'<p class="quiet after">and {more:,} more</p>' if more else "")
+    return table(kind.columns, shown) + (f'<p class="quiet after">and {more:,} more</p>' if more else "")
 
 
 def _clip(row: Row) -> Html:
@@ -120,3 +139,34 @@ def _clip(row: Row) -> Html:
 
 def _name(label: str | None) -> Cell:
     return "no name" if label is None else isolated(label)
+
+
+_KINDS = (
+    _Kind("added", "added", ["clip"], lambda row: [_clip(row)]),
+    _Kind("removed", "removed or set aside", ["clip"], lambda row: [_clip(row)]),
+    _Kind(
+        "renamed",
+        "renamed",
+        ["clip", "was called"],
+        lambda row: [_clip(row), isolated(row["previous_clip_id"])],
+    ),
+    _Kind("changed", "changed", ["clip"], lambda row: [_clip(row)]),
+    _Kind(
+        "moved",
+        "moved to another cluster",
+        ["clip", "from cluster", "to cluster"],
+        lambda row: [_clip(row), row["previous_cluster_id"], row["cluster_id"]],
+    ),
+    _Kind(
+        "relabelled",
+        "with another name",
+        ["clip", "was", "is", "by"],
+        lambda row: [_clip(row), _name(row["previous_label"]), _name(row["label"]), row["label_source"]],
+    ),
+    _Kind(
+        "references",
+        "references replaced",
+        ["cluster", "was", "is"],
+        lambda row: [row["cluster_id"], isolated(row["previous_clip_id"]), _clip(row)],
+    ),
+)

@@ -38,10 +38,14 @@ class Footage:
     figures: Mapping[str, str]
     elements: Sequence[str]
 
-    @property
-    def without_figure(self) -> int:
-        """How many clips are shown and cannot be played."""
-        return len(self.thumbnails) - len(self.figures)
+    def plays(self, *clip_ids: str) -> bool:
+        """Tell whether there was room for all of some clips."""
+        return all(one in self.figures for one in clip_ids)
+
+    def no_room(self, pictures: Iterable[Sequence[str]]) -> str:
+        """Say how many pictures, each given by the clips that it would play, do not play; "" where all do."""
+        still = sum(not self.plays(*one) for one in pictures)
+        return f"Takes that have no room on this page and are pictures only: {still}." if still else ""
 
     def button(self, stage: str, said: str, caption: str, *clip_ids: str) -> str:
         """Write the last clip's thumbnail as a button that plays all of them, from the left, in a stage.
@@ -58,7 +62,7 @@ class Footage:
             Clips with a thumbnail; where one cannot be played the picture is no button.
         """
         picture = f'<span class="still" aria-hidden="true">{self.thumbnails[clip_ids[-1]]}</span>{caption}'
-        if not all(one in self.figures for one in clip_ids):
+        if not self.plays(*clip_ids):
             return picture
         figures = " ".join(self.figures[one] for one in clip_ids)
         return (

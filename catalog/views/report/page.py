@@ -8,11 +8,9 @@ and the first rows of long tables, and says at each place what it leaves out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from motionary.catalog.errors import CatalogError
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.assets import asset
 from motionary.catalog.views.cluster_map import cluster_map_figure
@@ -21,13 +19,8 @@ from motionary.catalog.views.label_confusion import confusion_figure
 from motionary.catalog.views.mu_kappa import mu_kappa_figure
 from motionary.catalog.views.page import page, section
 from motionary.catalog.views.player import json_in_script
-from motionary.catalog.views.report.cards import (
-    MOST_CARDS,
-    cards_section,
-    cluster_cards,
-    takes_by_importance,
-)
-from motionary.catalog.views.report.changes import changes_section
+from motionary.catalog.views.report.cards import cards_section, cluster_cards, takes_by_importance
+from motionary.catalog.views.report.changes import Since, changes_section
 from motionary.catalog.views.report.footage import footage_of
 from motionary.catalog.views.report.packed import data_element, packed_chart, packed_plotly
 from motionary.catalog.views.report.review import review_queue, review_section, reviewed_clips
@@ -61,15 +54,16 @@ _CONTENTS = {
 }
 
 
-def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
+def report_page(catalog: Catalog, since: Since | None = None) -> str:
     """Show a run on one HTML page.
 
     Parameters
     ----------
     catalog : Catalog
         An opened catalog; it may hold no clip.
-    before : Catalog, optional
-        An earlier snapshot, to tell what changed since; see `snapshot_before`.
+    since : Since, optional
+        What changed since an earlier snapshot: of `changes_since_last`, or `changes_since`. Without it the
+        page says that there is none left, or that this run was the first.
 
     Returns
     -------
@@ -77,7 +71,7 @@ def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
         HTML with everything it needs inside.
     """
     cards, queue = cluster_cards(catalog), review_queue(catalog)
-    footage = footage_of(catalog, chain(takes_by_importance(cards[:MOST_CARDS]), reviewed_clips(queue)))
+    footage = footage_of(catalog, chain(takes_by_importance(cards), reviewed_clips(queue)))
     charts = {
         "map": cluster_map_figure(catalog) if len(catalog.clips) > 1 else None,
         "labels": confusion_figure(catalog),
@@ -85,7 +79,7 @@ def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
         "thresholds": mu_kappa_figure(catalog),
     }
     body = [
-        changes_section(catalog, before),
+        changes_section(catalog, since),
         cards_section(cards, footage),
         review_section(queue, footage),
         quarantine_section(catalog, _MOST_QUARANTINED),
@@ -107,15 +101,6 @@ def report_page(catalog: Catalog, before: Catalog | None = None) -> str:
         before=[_SKIP, f"<header>\n{heading(catalog)}\n</header>", _contents(body)],
         after=[*data, _script()],
     )
-
-
-def snapshot_before(catalog: Catalog) -> Catalog | None:
-    """Open the newest snapshot that is older than a catalog's own, None where none is left."""
-    earlier = [one for one in catalog.snapshots() if int(one) < int(catalog.snapshot.snapshot_id)]
-    for snapshot_id in reversed(earlier):
-        with suppress(CatalogError):  # vacuumed since they were listed, or damaged: no matter here
-            return Catalog.open(catalog.store.url, snapshot_id)
-    return None
 
 
 _SKIP = '<a class="skip" href="#main">Skip to the content</a>'

@@ -7,7 +7,7 @@ from typing import Any
 
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.query import Catalog
-from motionary.catalog.review import review
+from motionary.catalog.review import REASONS, review
 from motionary.catalog.views.page import Cell, Html, details, isolated, section, table
 from motionary.catalog.views.report.footage import Footage
 
@@ -16,15 +16,6 @@ MOST_CLIPS = 3000
 MOST_SEEN = 12
 _MOST_ROWS = 50
 _NAME, _TITLE, _STAGE = "review", "Review queue", "review-stage"
-
-_WHY = {
-    "moved": "its bytes were labelled under the name of a file that is gone",
-    "contradiction": "the same motion, or almost, has another label",
-    "mislabelled": "its label is not its cluster's",
-    "uncertain": "it was named by its cluster, with little confidence",
-    "unassigned": "it has no name",
-    "duplicate": "the same motion, or almost, is there under another name",
-}
 
 Row = dict[str, Any]
 
@@ -45,7 +36,7 @@ def review_queue(catalog: Catalog) -> list[Row] | str:
 def reviewed_clips(queue: list[Row] | str) -> Iterator[str]:
     """List the clips to look at: those first in the queue, each with the one that speaks against its name."""
     for row in _rows(queue)[:MOST_SEEN]:
-        yield from (one for one in (row["clip_id"], row["other"]) if one is not None)
+        yield from reversed(_played(row))
 
 
 def review_section(queue: list[Row] | str, footage: Footage) -> str:
@@ -71,18 +62,22 @@ def review_section(queue: list[Row] | str, footage: Footage) -> str:
         _TITLE,
         f"Clips whose names may be wrong, {len(queue):,} in all, the likeliest first{more}. "
         "Press a picture to see the clip beside the one that speaks against its name. "
-        "motionary label set CATALOG CLIP LABEL names a clip, and label review lists them all.",
+        "motionary label set CATALOG CLIP LABEL names a clip, and label review lists them all. "
+        + footage.no_room(_played(row) for row in queue[:MOST_SEEN]),
         f'<div class="stage" id="{_STAGE}"></div>',
-        details("What the reasons mean", table(["reason", "the clip is listed because"], [*_WHY.items()])),
+        details("What the reasons mean", table(["reason", "the clip is listed because"], [*REASONS.items()])),
         table(["", "clip", "why", "urgency", "called", "perhaps", "because of"], cells),
         name=_NAME,
     )
 
 
 def _seen(row: Row, footage: Footage) -> Html:
-    clips = [one for one in (row["other"], row["clip_id"]) if one is not None]
     said = f"Play {row['clip_id']}" + (f" beside {row['other']}" if row["other"] else "")
-    return Html(footage.button(_STAGE, said, "<span>Play</span>", *clips))
+    return Html(footage.button(_STAGE, said, "<span>Play</span>", *_played(row)))
+
+
+def _played(row: Row) -> list[str]:
+    return [one for one in (row["other"], row["clip_id"]) if one is not None]
 
 
 def _named(label: str | None) -> Cell:

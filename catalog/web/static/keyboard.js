@@ -66,16 +66,8 @@ function follow(link) {
 function showKeys() {
   const dialog = document.createElement("dialog");
   dialog.setAttribute("aria-label", "Keyboard");
-  const list = document.createElement("dl");
-  for (const [key, does] of KEYS) {
-    const name = document.createElement("dt");
-    const shown = document.createElement("kbd");
-    const told = document.createElement("dd");
-    shown.textContent = key;
-    told.textContent = does;
-    name.append(shown);
-    list.append(name, told);
-  }
+  const own = document.querySelector("p.keys"); // a page that has keys of its own tells them
+  const list = own ? own.cloneNode(true) : listOfKeys();
   const title = document.createElement("h2");
   title.textContent = "Keyboard";
   const close = document.createElement("button");
@@ -86,4 +78,18 @@ function showKeys() {
   document.body.append(dialog);
   dialog.showModal();
   return true;
+}
+
+function listOfKeys() {
+  const list = document.createElement("dl");
+  for (const [key, does] of KEYS) {
+    const name = document.createElement("dt");
+    const shown = document.createElement("kbd");
+    const told = document.createElement("dd");
+    shown.textContent = key;
+    told.textContent = does;
+    name.append(shown);
+    list.append(name, told);
+  }
+  return list;
 }

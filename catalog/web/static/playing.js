@@ -25,7 +25,9 @@ export async function playClip(clip) {
   close.focus();
   try {
     const scene = await dataOf("/data/scene", { clip });
-    if (dialog.open) player = createPlayer(stage, scene, { autoplay: true });
+    if (!dialog.open) return;
+    player = createPlayer(stage, scene, { autoplay: true });
+    player.canvas.focus(); // whose keys are meant now; Esc closes
   } catch (error) {
     stage.textContent = error.message;
   }

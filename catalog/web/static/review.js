@@ -4,7 +4,6 @@
 
 import { mountAll } from "./player.js";
 
-const known = JSON.parse(document.getElementById("known-labels").textContent);
 const desk = document.getElementById("desk");
 const said = document.getElementById("said");
 const failed = document.getElementById("failed");
@@ -17,14 +16,17 @@ let last = undo ? JSON.parse(undo.dataset.last) : null;
 let shown = 0;
 const ahead = new Map(); // pages by URL, fetched before they are asked for
 
+const onward = () => go("after");
+const back = () => go("previous");
 const KEYS = {
-  n: () => go("after"), ArrowRight: () => go("after"), p: () => go("previous"), ArrowLeft: () => go("previous"),
-  a: accept, Enter: accept, k: keep, r: focusLabel, u: takeBack, " ": play,
+  n: onward, j: onward, ArrowRight: onward, b: back, k: back, ArrowLeft: back,
+  a: accept, Enter: accept, s: keep, r: focusLabel, u: takeBack, " ": play, p: play,
 };
 
 document.addEventListener("keydown", (event) => {
   if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (event.target.id === "label" && event.key === "Escape") return event.target.blur();
+  const held = event.target.closest("#label, .motionary-player");
+  if (held && event.key === "Escape") return document.activeElement.blur(); // the keys are the page's again
   const busy = event.target.closest("input, textarea, select, dialog, .motionary-player");
   const pressed = event.target.closest("a, button, summary") && ["Enter", " "].includes(event.key);
   const does = KEYS[event.key];
@@ -50,10 +52,6 @@ document.addEventListener("submit", (event) => {
   event.preventDefault();
   const label = document.getElementById("label").value.trim();
   if (label) decide(label);
-});
-
-document.addEventListener("input", (event) => {
-  if (event.target.id === "label" && event.inputType?.startsWith("insert")) complete(event.target);
 });
 
 undo?.addEventListener("click", takeBack);
@@ -89,7 +87,7 @@ function play() {
 
 function decide(label) {
   if (!editable) return tell(readOnly());
-  const { clip, waiting: onward } = item();
+  const { clip, waiting: next } = item();
   document.getElementById("item").dataset.decided = "yes";
   send(
     () => post("/edit/relabel", { clip, label }),
@@ -102,7 +100,7 @@ function decide(label) {
     clip,
   );
   document.activeElement?.blur();
-  if (onward) show(onward);
+  if (next) show(next);
   else refresh();
 }
 
@@ -140,7 +138,13 @@ function told(undoable, text) {
   if (undoable !== undefined) last = undoable;
   tellLast();
   tell(waiting ? `${text} (${waiting} more to come)` : text);
-  if (!waiting) refresh();
+  ahead.clear(); // what was fetched ahead knows nothing of this
+  if (!waiting) refresh().then(() => atTheEnd() && tell(`${text}. Nothing more waits to be decided.`));
+}
+
+function atTheEnd() {
+  const { decided, waiting: more } = item();
+  return editable && decided === "yes" && !more;
 }
 
 async function post(url, body) {
@@ -218,11 +222,16 @@ async function refresh() {
     const fresh = now.querySelector(part);
     if (fresh) old.querySelector(part)?.replaceWith(document.adoptNode(fresh));
   }
+  if (!ahead.size) fetchAhead();
 }
 
 function settle() {
   mountAll(document.getElementById("review"));
   ahead.clear();
+  fetchAhead();
+}
+
+function fetchAhead() {
   const next = (editable && item().waiting) || item().after;
   if (next) ahead.set(next, read(next).then(warm));
   ahead.get(next)?.catch(() => ahead.delete(next));
@@ -239,13 +248,4 @@ function warm(page) {
   const scene = page.querySelector(".motionary-player")?.dataset.sceneUrl;
   if (scene) fetch(scene).catch(() => {});
   return page;
-}
-
-/** Complete what was typed to the most frequent label that begins so; the rest is marked, to be typed over. */
-function complete(field) {
-  const typed = field.value;
-  const found = typed && known.find((label) => label.toLowerCase().startsWith(typed.toLowerCase()) && label.length > typed.length);
-  if (!found || field.selectionStart !== typed.length) return;
-  field.value = typed + found.slice(typed.length);
-  field.setSelectionRange(typed.length, field.value.length);
 }
