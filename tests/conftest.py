@@ -7,8 +7,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import fsspec
 import pyarrow as pa
 import pytest
+import requests
 
 from motionary.catalog.schema import PUBLISHED, SCHEMAS
 from motionary.catalog.snapshot import Snapshot, current_snapshot, next_snapshot_id, publish
@@ -44,6 +46,29 @@ def demo_catalog(demo_library: Path) -> str:
     url = str(demo_library.parent / "catalog")
     run(Job([str(demo_library)], url, PipelineConfig(), demo_library / "labels.csv"), silent)
     return url
+
+
+@pytest.fixture(scope="module")
+def bucket() -> Iterator[str]:
+    """Serve S3 on this machine, with one bucket; returns its URL."""
+    pytest.importorskip("s3fs")
+    server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {
+            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+            "AWS_ACCESS_KEY_ID": "nobody",
+            "AWS_SECRET_ACCESS_KEY": "secret",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }.items():
+            patch.setenv(name, value)
+        # What another module's server held, and who knows its address, would come along.
+        requests.post(f"http://{host}:{port}/moto-api/reset", timeout=60).raise_for_status()
+        fsspec.get_filesystem_class("s3").clear_instance_cache()
+        fsspec.filesystem("s3", use_listings_cache=False).mkdir("motionary-test")
+        yield "s3://motionary-test"
+    server.stop()
 
 
 @contextmanager

@@ -1,11 +1,9 @@
 """Catalogs that are not on disk: in memory, and on an S3 server of this machine."""
 
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import fsspec
 import pytest
 
 from motionary.catalog import Catalog, CatalogError
@@ -16,26 +14,6 @@ from motionary.catalog.vacuum import vacuum
 from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
-
-
-@pytest.fixture(scope="module")
-def bucket() -> Iterator[str]:
-    """Serve S3 on this machine, with one bucket."""
-    pytest.importorskip("s3fs")
-    server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", 0, verbose=False)
-    server.start()
-    host, port = server.get_host_and_port()
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in {
-            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
-            "AWS_ACCESS_KEY_ID": "nobody",
-            "AWS_SECRET_ACCESS_KEY": "secret",
-            "AWS_DEFAULT_REGION": "us-east-1",
-        }.items():
-            patch.setenv(name, value)
-        fsspec.filesystem("s3", use_listings_cache=False).mkdir("motionary-test")
-        yield "s3://motionary-test"
-    server.stop()
 
 
 @pytest.fixture(scope="module")

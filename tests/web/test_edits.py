@@ -346,29 +346,9 @@ def test_the_latest_change_is_read_while_others_are_made(url, threads_change_oft
         thread.join()
 
 
-@pytest.fixture
-def bucket(monkeypatch):
-    """Serve S3 on this machine."""
-    pytest.importorskip("s3fs")
-    server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", 0, verbose=False)
-    server.start()
-    host, port = server.get_host_and_port()
-    for name, value in {
-        "AWS_ENDPOINT_URL": f"http://{host}:{port}",
-        "AWS_ACCESS_KEY_ID": "nobody",
-        "AWS_SECRET_ACCESS_KEY": "secret",
-        "AWS_DEFAULT_REGION": "us-east-1",
-    }.items():
-        monkeypatch.setenv(name, value)
-    files = fsspec.filesystem("s3", use_listings_cache=False)
-    files.mkdir("motionary-browse")
-    yield files
-    server.stop()
-
-
 def test_a_catalog_on_s3_is_shown_edited_and_undone(demo_catalog, bucket):
-    bucket.put(demo_catalog, "motionary-browse/catalog", recursive=True)
-    url = "s3://motionary-browse/catalog"
+    url = f"{bucket}/catalog"
+    fsspec.filesystem("s3").put(demo_catalog, url, recursive=True)
     before = state(url)
     with served(url, editor=editor_of(url)) as client:
         assert client.get("/").status_code == 200
