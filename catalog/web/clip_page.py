@@ -49,7 +49,7 @@ def _known(catalog: Catalog, clip_id: str) -> dict[str, Any]:
         "style": _style(style),
         "style_kind": "in rad²"
         if style["kind"] == "rotations"
-        else "in leg lengths², for its rig is another",
+        else "in leg lengths², for the rigs of its cluster differ",
         "notes": takes["notes"] or [],
     }
 
@@ -91,11 +91,12 @@ def _why_so_called(catalog: Catalog, row: dict[str, Any]) -> str:
 def _scores(row: dict[str, Any]) -> list[tuple[str, str, str]]:
     """List how well it is aligned: what, the figure, what that means."""
     seconds = row["segment_length"] / row["frame_rate"]
+    frames = f"{row['segment_length']} frames at {row['frame_rate']:g} a second"
     return [
         ("correlation before", f"{row['correlation_before']:.3f}", "with the reference, only stretched"),
         ("correlation aligned", f"{row['correlation']:.3f}", "the same, in the reference's time"),
         ("distortion", f"{row['distortion']:.4f}", "|h| of CoTW: how much the warp bent the motion"),
-        ("segment", f"{seconds:.2f} s", f"{row['segment_length']} frames, bent by at most {row['slack']}"),
+        ("segment", f"{seconds:.2f} s", f"{frames}, bent by at most {row['slack']}"),
     ]  # fmt: skip
 
 
