@@ -51,6 +51,7 @@ class Peers:
         return naive.dtw_key(naive.euclidean(self.clips[i], other) ** power)
 
 
+@pytest.mark.slow
 def test_runs_without_peers_and_says_so(tmp_path):
     out = tmp_path / "made" / "bench.json"
     arguments = ["--quick", "--embedded", "--peers", str(tmp_path / "absent"), "--json", str(out)]
@@ -152,6 +153,7 @@ def test_the_peers_constraints_hold_versions_only():
     assert {"aeon", "dtaidistance", "tslearn"} <= {line.split("==")[0] for line in lines}
 
 
+@pytest.mark.slow
 def test_the_alignments_benchmark_runs_with_and_without_real_clips(tmp_path):
     out = tmp_path / "made" / "alignment.json"
     command = [sys.executable, "-m", "tests.benchmarks.alignment", "--quick", "--json", str(out)]
@@ -209,6 +211,7 @@ def test_an_alignments_figure_is_met_from_the_right_side():
     assert alignment.Figure("", 90).met is None
 
 
+@pytest.mark.slow
 def test_the_questions_benchmark_runs_on_the_catalog_that_is_there(tmp_path, demo_catalog):
     folder, out = tmp_path / "ask", tmp_path / "made" / "ask.json"
     folder.mkdir()

@@ -62,7 +62,7 @@ def settled(page) -> None:
     page.evaluate("scrollTo(0, 0)")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_every_page_is_accessible_and_fits_a_telephone(base, page, scheme, accessible, screenshot):
     page.emulate_media(color_scheme=scheme)
     for name, url in every_page(base, WALK, RUN).items():

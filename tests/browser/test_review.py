@@ -50,7 +50,7 @@ def press(page, key: str, then_shows: str) -> None:
     page.locator(f'#item[data-clip="{then_shows}"]').wait_for()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_reviewing_by_keyboard(site, page, mistaken, accessible, screenshot, scheme):
     page.emulate_media(color_scheme=scheme)
     with Catalog.open(mistaken) as catalog:
@@ -179,7 +179,7 @@ def test_read_only_shows_the_same_without_editing(page, mistaken, accessible):
     assert labels(mistaken) == {}
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_a_file_that_is_chosen(site, page, demo_library, accessible, screenshot, scheme):
     page.emulate_media(color_scheme=scheme)
     page.goto(f"{site}/drop")
