@@ -54,6 +54,10 @@ class Example:
     seconds: float
 
 
+ClipOrFile = str | os.PathLike[str] | Example
+"""How an example is named: a clip_id, a file, or itself where it was made before."""
+
+
 @dataclass(frozen=True, eq=False)
 class LibraryFeatures:
     """The vectors of all clips of a catalog.
@@ -70,15 +74,15 @@ class LibraryFeatures:
     clips: Sequence[NDArray[np.float32]]
 
 
-def example_of(catalog: Catalog, clip_or_file: str | os.PathLike[str]) -> Example:
+def example_of(catalog: Catalog, clip_or_file: ClipOrFile) -> Example:
     """Find what is asked about.
 
     Parameters
     ----------
     catalog : Catalog
-    clip_or_file : str or path
+    clip_or_file : str, path or Example
         A clip_id of the catalog, or else a file, in a zip or not, read as the run's settings say; an AMC
-        finds its ASF by its name.
+        finds its ASF by its name. An example stands for itself.
 
     Raises
     ------
@@ -92,6 +96,8 @@ def example_of(catalog: Catalog, clip_or_file: str | os.PathLike[str]) -> Exampl
     from motionary.pipeline.readers import read_motion
     from motionary.pipeline.readers.zipped import archive_of
 
+    if isinstance(clip_or_file, Example):
+        return clip_or_file
     name = os.fspath(clip_or_file)
     seconds = clip_seconds(catalog)
     if name in seconds:

@@ -6,12 +6,11 @@ Distances are computed and not looked up, so that a file can be asked about too;
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from motionary.catalog.example import Example, example_of
+from motionary.catalog.example import ClipOrFile, Example, example_of
 from motionary.catalog.explanation import CurvePoint, ExplainedClip, Explanation, Span, Zone
 from motionary.catalog.ranked_distance import ranked_distance
 from motionary.catalog.warp_pieces import make_warp
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
 
 def explain(
     catalog: Catalog,
-    a: str | os.PathLike[str],
-    b: str | os.PathLike[str],
+    a: ClipOrFile,
+    b: ClipOrFile,
     metric: Metric | None = None,
 ) -> Explanation:
     """Take the distances of two clips apart.
@@ -34,8 +33,8 @@ def explain(
     Parameters
     ----------
     catalog : Catalog
-    a, b : str or path
-        Clips of the catalog, or files, read as the run's settings say.
+    a, b : str, path or Example
+        Clips of the catalog, or files, read as the run's settings say, or what `example_of` made of one.
     metric : {"dtw", "b_dtw", "weighted", "fuzzy"}, optional
         The distance to explain; by default the one that the published clusters are made of.
 

@@ -123,6 +123,25 @@ class CurvePoint:
     contributions: dict[str, float]
 
 
+@dataclass(frozen=True)
+class Part:
+    """What a joint, or travel, adds to a distance.
+
+    Parameters
+    ----------
+    name : str
+        As people read it.
+    adds : float
+    share, of_most : float
+        Of the distance, and of what adds most; 0 where nothing is added.
+    """
+
+    name: str
+    adds: float
+    share: float
+    of_most: float
+
+
 @dataclass(frozen=True, repr=False)
 class Explanation:
     """What the distances of two clips are made of; lengths are in the features' unit, leg lengths about.
@@ -156,6 +175,17 @@ class Explanation:
     contributions: dict[str, dict[str, float]]
     curve: list[CurvePoint]
     warp: PairWarp
+
+    @property
+    def upper_end(self) -> str:
+        """The distance of `metric`; of the fuzzy ones the greater."""
+        return "fuzzy_high" if self.metric == "fuzzy" else self.metric
+
+    def parts(self, distance: str) -> list[Part]:
+        """List what every joint, and travel, adds to one of `distances`, the most first."""
+        added = sorted(self.contributions[distance].items(), key=lambda one: -one[1])
+        total, most = sum(value for _, value in added) or 1.0, added[0][1] or 1.0
+        return [Part(name.replace("_", " "), value, value / total, value / most) for name, value in added]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as dicts, lists, text and numbers, as JSON holds them."""

@@ -19,7 +19,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from motionary.catalog.errors import CatalogError
-from motionary.catalog.example import clip_seconds, example_of, library_features
+from motionary.catalog.example import ClipOrFile, Example, clip_seconds, example_of, library_features
 from motionary.catalog.joint_columns import JointColumns, joint_columns
 from motionary.catalog.mutual import mutual_proximity, usual_distances
 from motionary.catalog.own_pairs import own_pairs
@@ -113,7 +113,7 @@ class Similar:
 
 def similar(
     catalog: Catalog,
-    clip_or_file: str | os.PathLike[str],
+    clip_or_file: ClipOrFile,
     k: int = 10,
     *,
     metric: Metric | None = None,
@@ -125,8 +125,8 @@ def similar(
     Parameters
     ----------
     catalog : Catalog
-    clip_or_file : str or path
-        A clip_id, which is not among the answers, or else a file.
+    clip_or_file : str, path or Example
+        A clip_id, which is not among the answers, or else a file, or what `example_of` made of one.
     k : int
         How many clips.
     metric : {"dtw", "b_dtw", "weighted", "fuzzy"}, optional
@@ -170,9 +170,7 @@ def similar(
         **{name: rows[name] for name in ("cluster_id", "label", "seconds")},
     }
     table = pa.table(columns, schema=pa.schema([_SCHEMA.field(name) for name in columns]))
-    return Similar(
-        os.fspath(clip_or_file), distance.metric, table, found.compared, found.pruned, found.frames
-    )
+    return Similar(found.name, distance.metric, table, found.compared, found.pruned, found.frames)
 
 
 def packed_library(catalog: Catalog, joints: JointColumns | None = None) -> PackedLibrary:
@@ -195,8 +193,9 @@ def packed_library(catalog: Catalog, joints: JointColumns | None = None) -> Pack
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Clips, by their place in clip_id order, their distances, and how those came about."""
+    """Clips like `name`, by their place in clip_id order, their distances, and how those came about."""
 
+    name: str
     places: NDArray[np.int64]
     distances: NDArray[np.float32]
     compared: int = 0
@@ -206,14 +205,14 @@ class _Found:
 
 def _distances(
     catalog: Catalog,
-    clip_or_file: str | os.PathLike[str],
+    clip_or_file: ClipOrFile,
     k: int,
     distance: RankedDistance,
     joints: str | Sequence[str] | None,
 ) -> _Found:
     """Find at least the k nearest clips."""
     clip_ids = _takes(catalog)["clip_id"].combine_chunks()
-    name = os.fspath(clip_or_file)
+    name = None if isinstance(clip_or_file, Example) else os.fspath(clip_or_file)
     if joints is None and name in clip_seconds(catalog):
         return _stored(catalog, name, clip_ids, distance)
     from motionary.pipeline.distances.nearest import nearest_clips
@@ -232,7 +231,8 @@ def _distances(
         tau=distance.tau,
         among=among,
     )
-    return _Found(found.index, found.distance, found.compared, found.pruned, len(example.features))
+    frames = len(example.features)
+    return _Found(example.name, found.index, found.distance, found.compared, found.pruned, frames)
 
 
 def _stored(catalog: Catalog, clip_id: str, clip_ids: pa.Array, distance: RankedDistance) -> _Found:
@@ -244,7 +244,7 @@ def _stored(catalog: Catalog, clip_id: str, clip_ids: pa.Array, distance: Ranked
             "`motionary verify` finds what is wrong with it"
         )
     places = pc.index_in(pairs["other"].combine_chunks(), clip_ids).to_numpy().astype(np.int64)
-    return _Found(places, distance.of(pairs))
+    return _Found(clip_id, places, distance.of(pairs))
 
 
 def _takes(catalog: Catalog) -> pa.Table:

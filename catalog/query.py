@@ -25,6 +25,7 @@ from motionary.pipeline.motion import Motion
 
 if TYPE_CHECKING:
     from motionary.catalog.description import Description
+    from motionary.catalog.example import ClipOrFile
     from motionary.catalog.explanation import Explanation
     from motionary.catalog.export import ExportedClip
     from motionary.catalog.export_plan import ExportFormat
@@ -268,7 +269,7 @@ class Catalog:
 
     def similar(
         self,
-        clip_or_file: str | os.PathLike[str],
+        clip_or_file: ClipOrFile,
         k: int = 10,
         *,
         metric: Metric | None = None,
@@ -301,9 +302,7 @@ class Catalog:
 
         return assign(self, files, advance=advance)
 
-    def explain(
-        self, a: str | os.PathLike[str], b: str | os.PathLike[str], metric: Metric | None = None
-    ) -> Explanation:
+    def explain(self, a: ClipOrFile, b: ClipOrFile, metric: Metric | None = None) -> Explanation:
         """Tell why two motions are as far apart as they are; see `motionary.catalog.explain`."""
         from motionary.catalog.explain import explain
 

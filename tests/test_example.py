@@ -96,3 +96,13 @@ def test_a_clip_in_quarantine_says_why(demo_library, tmp_path, silent_progress):
         pytest.raises(CatalogError, match=r"broken\.bvh is in quarantine: .+; .+"),
     ):
         example_of(catalog, "broken.bvh")
+
+
+def test_an_example_stands_for_itself_whatever_it_is_called(catalog, demo_library):
+    """As a dropped file that is called like a clip."""
+    name = "walk/walk_tired_alex_01.bvh"
+    example = example_from_motion(catalog, read_motion(demo_library / "run/run_tired_bea_01.bvh"), name)
+    near = catalog.similar(example, 1)
+    assert (near.name, near.table["clip_id"].to_pylist()) == (name, ["run/run_tired_bea_01.bvh"])
+    why = catalog.explain(example, "run/run_tired_bea_01.bvh")
+    assert (why.a.name, why.a.clip_id, why.distances["dtw"]) == (name, None, 0.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from motionary.catalog import Catalog, CatalogError
+from motionary.catalog import Catalog, CatalogError, sql
 from motionary.catalog.verify import verify
 from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.main_job import run
@@ -135,3 +135,13 @@ def test_a_catalog_without_clips_has_nothing_to_compare_with(
     for options in ((), ("--within",), ("--rank", "mutual"), ("--joints", "arms")):
         code, _, told = motionary("similar", url, file, *options)
         assert (code, "has no clips" in told) == (1, True), told
+
+
+def test_a_mistake_has_only_the_tables_it_names_looked_at_for_damage(catalog, monkeypatch):
+    looked = []
+    monkeypatch.setattr(
+        sql, "damaged_file", lambda store, snapshot, names: looked.append(set(snapshot.tables))
+    )
+    with pytest.raises(CatalogError, match="secs"):
+        catalog.sql("select secs from takes")
+    assert looked == [{"clips", "clusters"}]

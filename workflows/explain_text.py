@@ -60,13 +60,11 @@ def _contributions(explanation: Explanation, mark: str) -> list[RenderableType]:
 
 def _bars(explanation: Explanation, distance: str, mark: str) -> RenderableType:
     total = explanation.distances[distance]
-    parts = sorted(explanation.contributions[distance].items(), key=lambda one: -one[1])
-    longest = parts[0][1] or 1.0
+    parts = explanation.parts(distance)
     rows = [
-        [*_added(name.replace("_", " "), value, total), mark * round(_BAR * value / longest)]
-        for name, value in parts[:_MOST_PARTS]
+        [*_added(one.name, one.adds, total), mark * round(_BAR * one.of_most)] for one in parts[:_MOST_PARTS]
     ]
-    others = [value for _, value in parts[_MOST_PARTS:]]
+    others = [one.adds for one in parts[_MOST_PARTS:]]
     rows.append([*_added(f"{len(others)} others", sum(others), total), ""])
     title = f"What makes the distance: {distance} {total:.4f}"
     return text_table(["joint", "adds", "share, %", ""], rows, title)

@@ -31,7 +31,7 @@ def library_map(catalog: Catalog, places: NDArray[np.float64] | None = None) -> 
     Parameters
     ----------
     catalog : Catalog
-        An opened catalog. 270 clips take 2 s, 10,000 some 20 s of one core and 250 MB.
+        An opened catalog. Of ten thousand clips it takes seconds and some hundred megabytes.
     places : array (N, 2), optional
         Its `map_places`, where they are known already: they stay when labels change.
 

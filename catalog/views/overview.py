@@ -35,7 +35,7 @@ def overview_page(catalog: Catalog) -> str:
     str
         HTML with everything it needs inside, Plotly's script included where there is a chart.
     """
-    name = catalog_name(catalog)
+    name = catalog_name(catalog.store.url)
     charts = [dendrogram_figure(catalog), mu_kappa_figure(catalog)]
     return page(
         f"motionary: {name}",

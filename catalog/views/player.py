@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionary.catalog.views.assets import asset
 from motionary.catalog.views.figure_data import Figure
-from motionary.catalog.views.figures import Colour, Layout, clip_figure, figure_of, scene
+from motionary.catalog.views.figures import Colour, Layout, clip_figures, figure_of, scene
 from motionary.catalog.views.page import page
 from motionary.pipeline.motion import Motion
 
@@ -148,7 +148,8 @@ def play_clips(
     ValueError
         No clip is given.
     """
-    figures = [clip_figure(catalog, clip_id) for clip_id in clip_ids]
+    made = {figure.clip_id: figure for figure in clip_figures(catalog, set(clip_ids))} if clip_ids else {}
+    figures = [made[clip_id] for clip_id in clip_ids]
     return play(*figures, layout=layout, aligned=aligned, trails=trails, colour=colour)
 
 

@@ -22,9 +22,9 @@ Show = Callable[["go.Figure", str], str]
 """Puts a chart into a page: `chart_html`, or what packs it first."""
 
 
-def catalog_name(catalog: Catalog) -> str:
+def catalog_name(url: str) -> str:
     """Return what a catalog is called: the last part of its URL."""
-    return posixpath.basename(catalog.store.url.rstrip("/"))
+    return posixpath.basename(url.rstrip("/")) or url
 
 
 def heading(catalog: Catalog) -> str:
@@ -43,9 +43,10 @@ def heading(catalog: Catalog) -> str:
     )
     created = datetime.fromisoformat(catalog.snapshot.created_at).astimezone(UTC)
     made = f"Snapshot {catalog.snapshot.snapshot_id} of {created:%Y-%m-%d %H:%M} UTC"
+    name = escape(catalog_name(catalog.store.url))
     library = ", ".join(f"<code>{escape(one)}</code>" for one in run["library"])
     return (
-        f'<h1><bdi>{escape(catalog_name(catalog))}</bdi></h1>\n<p class="quiet">{made}, by motionary '
+        f'<h1><bdi>{name}</bdi></h1>\n<p class="quiet">{made}, by motionary '
         f"{escape(run['version'])}, from {library}</p>\n{figures}"
     )
 

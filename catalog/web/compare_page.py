@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
@@ -41,7 +39,7 @@ def compare(request: Request) -> Response:
         why=why,
         rows=clip_rows(shown.catalog, given),
         distances=_distances(why) if why else [],
-        parts=_parts(why) if why else [],
+        parts=why.parts(why.upper_end) if why else [],
         short=short_text,
     )
 
@@ -58,14 +56,3 @@ def _distances(why: Explanation) -> list[tuple[str, str, str, bool]]:
     values = {name: f"{found[name]:.4f}" for name in _METRICS if name in found}
     values["fuzzy"] = f"{found['fuzzy_low']:.4f} to {found['fuzzy_high']:.4f}"
     return [(name, values[name], meaning, name == why.metric) for name, meaning in _METRICS.items()]
-
-
-def _parts(why: Explanation) -> list[dict[str, Any]]:
-    """List what every joint, and travel, adds to the distance, the most first."""
-    end = "fuzzy_high" if why.metric == "fuzzy" else why.metric
-    parts = sorted(why.contributions[end].items(), key=lambda one: -one[1])
-    total, most = sum(value for _, value in parts) or 1.0, parts[0][1] or 1.0
-    return [
-        {"name": name.replace("_", " "), "adds": value, "share": value / total, "bar": max(0.0, value / most)}
-        for name, value in parts
-    ]

@@ -19,7 +19,7 @@ from motionary.catalog.views.thumbnail import thumbnail_svg
 from motionary.catalog.web.caching import cached_response
 from motionary.catalog.web.opened import Shown
 from motionary.catalog.web.render import shown_to
-from motionary.catalog.web.search import find
+from motionary.catalog.web.search import TooManyWords, find
 
 _MOST_FIGURES = 8
 _SUGGESTED = 10
@@ -44,7 +44,7 @@ def send_scene(request: Request) -> Response:
 
     def make() -> bytes:
         figures = [figure(shown, one) for one in dict.fromkeys(clip_ids)]
-        return _json(scene(figures, layout=layout, aligned="aligned" in request.query_params))
+        return _json(scene(figures, layout=layout))
 
     require(shown, *clip_ids)
     return cached_response(request, shown.edition, "application/json", make)
@@ -74,7 +74,10 @@ def send_thumbnail(request: Request) -> Response:
 
 def suggest(request: Request) -> Response:
     """Answer /data/search?q=: the first clips that have these words."""
-    found = find(shown_to(request), request.query_params.get("q", ""))
+    try:
+        found = find(shown_to(request), request.query_params.get("q", ""))
+    except TooManyWords:
+        found = ()  # the page of the search says so
     return JSONResponse({"clips": list(found[:_SUGGESTED]), "total": len(found)})
 
 

@@ -29,7 +29,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from motionary.catalog.errors import NoClips
-from motionary.catalog.explanation import Explanation
+from motionary.catalog.example import example_from_motion
 from motionary.catalog.given_files import Given
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.figures import figure_of, scene
@@ -208,7 +208,7 @@ def _looked_at(request: Request, path: Path, name: str) -> dict[str, Any]:
     drawn = figure_of(motion, name=name)
     found: dict[str, Any] = {"name": name, "motion": motion, "cannot": None, "rows": []}
     try:
-        found |= _compared(shown, path, motion)
+        found |= _compared(shown, motion, name)
     except SkeletonError as error:
         found["cannot"] = f"{error.what}; {error.mend}"
     except NoClips as error:
@@ -226,23 +226,16 @@ def _read(catalog: Catalog, path: Path) -> Motion:
     return motion
 
 
-def _compared(shown: Shown, path: Path, motion: Motion) -> dict[str, Any]:
+def _compared(shown: Shown, motion: Motion, name: str) -> dict[str, Any]:
     catalog = shown.catalog
-    near = catalog.similar(path, _NEIGHBOURS)
+    example = example_from_motion(catalog, motion, name)
+    near = catalog.similar(example, _NEIGHBOURS)
     rows = near_rows(catalog, near)
-    why = catalog.explain(path, rows[0]["clip_id"])
+    why = catalog.explain(example, rows[0]["clip_id"])
     return {
         "how": near.how,
         "rows": rows,
         "assigned": catalog.assign(Given(motion.name, motion)).to_pylist()[0],
         "why": why,
-        "parts_of_it": _parts(why),
+        "parts_of_it": why.parts(why.upper_end)[:_PARTS],
     }
-
-
-def _parts(why: Explanation) -> list[tuple[str, float, float]]:
-    """List the joints that add most to the distance: name, what it adds, its share."""
-    metric = "fuzzy_high" if why.metric == "fuzzy" else why.metric
-    added = sorted(why.contributions[metric].items(), key=lambda one: -one[1])
-    total = sum(value for _, value in added) or 1.0
-    return [(name.replace("_", " "), value, value / total) for name, value in added[:_PARTS]]

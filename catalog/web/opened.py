@@ -31,7 +31,7 @@ LOOK_EVERY = 1.0
 """Seconds for which the published snapshot is taken for the published one."""
 
 MOST_KEPT = 256_000_000
-"""Bytes of all that is kept, pickled; 10,000 thumbnails are some 30 MB of it."""
+"""Bytes of all that is kept, pickled: the thumbnails of ten thousand clips and much more."""
 
 _MADE_OF = {"thumbnail": ("clips", "frames"), "places": ("clips", "pairs", "runs")}
 """Kinds of things that are made of some tables alone; `runs` holds by which distance clips are compared."""
@@ -158,11 +158,6 @@ class Opened:
         self._looks = self._latest = 0
         self._state: object = None
         self._shown: Shown | None = None
-
-    @property
-    def catalog(self) -> Catalog:
-        """The published snapshot."""
-        return self.shown().catalog
 
     def shown(self) -> Shown:
         """Return the published snapshot with what was made of it; ask once a request.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import posixpath
 from importlib.resources import files
 from urllib.parse import urlencode
 
@@ -14,6 +13,7 @@ from starlette.responses import HTMLResponse
 from motionary.catalog.description import duration
 from motionary.catalog.views.colours import cluster_character, cluster_colour
 from motionary.catalog.views.page import isolated
+from motionary.catalog.views.sections import catalog_name
 from motionary.catalog.web.opened import Opened, Shown
 from motionary.catalog.web.static_files import static_url
 
@@ -34,7 +34,7 @@ def render(request: Request, template: str, *, status: int = 200, **context: obj
     opened: Opened = request.app.state.opened
     shown = getattr(request.state, "shown", None)
     common = {
-        "catalog": posixpath.basename(opened.url.rstrip("/")) or opened.url,
+        "catalog": catalog_name(opened.url),
         "snapshot": shown.catalog.snapshot.snapshot_id if shown else None,
         "edition": shown.edition if shown else "",
         "motions_edition": shown.motions_edition if shown else "",

@@ -35,6 +35,10 @@ _ROW = (
 )
 
 
+class TooManyWords(CatalogError):
+    """More than anybody means, and each takes time."""
+
+
 @dataclass(frozen=True)
 class Page:
     """Some of many rows.
@@ -71,12 +75,11 @@ def find(shown: Shown, words: str, condition: str = "") -> Sequence[str]:
     Raises
     ------
     CatalogError
-        There are more words than anybody means, or it is no condition; see
-        `motionary.catalog.web.condition`.
+        `TooManyWords`, or it is no condition; see `motionary.catalog.web.condition`.
     """
     asked = tuple(dict.fromkeys(words.lower().split()))
     if len(asked) > _MOST_WORDS:
-        raise CatalogError(f"{len(asked):,} words are asked for at once; ask for {_MOST_WORDS} at most")
+        raise TooManyWords(f"{len(asked):,} words are asked for at once; ask for {_MOST_WORDS} at most")
     return shown.keep("search", ("find", asked, condition), lambda: _find(shown, asked, condition))
 
 

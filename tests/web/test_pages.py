@@ -129,8 +129,9 @@ def test_a_wrong_condition_is_told_beside_the_box(client, condition, told):
 
 
 def test_more_words_than_anybody_means_are_told(client):
-    page = read(client, "/search", q=" ".join(f"w{number}" for number in range(2000)))
-    assert "2,000 words are asked for at once" in page.text
+    words = " ".join(f"w{number}" for number in range(2000))
+    assert "2,000 words are asked for at once" in read(client, "/search", q=words).text
+    assert client.get("/data/search", params={"q": words}).json() == {"clips": [], "total": 0}
 
 
 def test_what_looks_like_a_condition_is_offered_as_one(client):

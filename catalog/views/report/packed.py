@@ -1,8 +1,8 @@
 """Scripts and charts that lie in a page compressed until they are looked at.
 
-Plotly's script is 4.8 MB, as text of its gzip 2.0 MB, and a browser takes longer to run it than to show all
-the rest of a page. So it lies there as data, and `report.js` unpacks it by the browser's DecompressionStream
-when the first chart comes into view.
+Plotly's script is most of a page, as text of its gzip less than half as much, and a browser takes longer to
+run it than to show all the rest. So it lies there as data, and `report.js` unpacks it by the browser's
+DecompressionStream when the first chart comes into view.
 """
 
 from __future__ import annotations

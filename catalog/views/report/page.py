@@ -95,7 +95,7 @@ def report_page(catalog: Catalog, since: Since | None = None) -> str:
     if any(charts.values()):
         data.append(packed_plotly())
     return page(
-        f"{catalog_name(catalog)}, snapshot {catalog.snapshot.snapshot_id}: motionary report",
+        f"{catalog_name(catalog.store.url)}, snapshot {catalog.snapshot.snapshot_id}: motionary report",
         body,
         head=f"<style>\n{asset('report/report.css')}</style>",
         before=[_SKIP, f"<header>\n{heading(catalog)}\n</header>", _contents(body)],
