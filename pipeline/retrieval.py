@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.evaluation import Values, codes_of, codes_of_all
+from motionary.pipeline.evaluation.clusters import Values, codes_of, codes_of_all
 
 
 def nearest_neighbour_accuracy(

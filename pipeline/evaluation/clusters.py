@@ -1,4 +1,4 @@
-"""How well clusters agree with known classes; `retrieval.py` asks the same of distances.
+"""How well clusters agree with known classes; `pipeline/retrieval.py` asks the same of distances.
 
 Throughout, `clusters` and `classes` hold one hashable value a clip, and a clip whose class is missing (None,
 or a missing value of pandas) is left out.
