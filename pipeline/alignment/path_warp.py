@@ -1,4 +1,4 @@
-"""Warps that follow a path of frames: dynamic time warping (DTW), and what other methods of its kind share.
+"""Warps that follow a path of frames: what dynamic time warping (`dtw.py`) and its kind share.
 
 A path joins frames of the moving sequence with frames of the reference, monotonously in both. The moving
 sequence is shown in the reference's time, so reference frame k shows the *mean* of the moving frames that the
@@ -19,9 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.alignment.warp import Warp, checked_pair
-from motionary.pipeline.alignment.weights import checked_weights
-from motionary.pipeline.motion import FloatArray
+from motionary.pipeline.alignment.warp import Warp
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,38 +33,6 @@ class PathWarp(Warp):
     """
 
     path: NDArray[np.int64]
-
-
-def dtw(moving: FloatArray, reference: FloatArray, weights: FloatArray | None = None) -> PathWarp:
-    """Warp one sequence along the path on which its frames lie nearest to the reference's [CoTW 2].
-
-    Parameters
-    ----------
-    moving : array (n, dofs)
-        The sequence to be warped.
-    reference : array (m, dofs)
-        The sequence whose timing it takes.
-    weights : array (dofs,), optional
-        Of the squared differences, not negative; 1 each by default.
-
-    Returns
-    -------
-    PathWarp
-        Along `motionary.pipeline.distances.dtw_path`: the least total of Euclidean distances, steps (1, 1),
-        (1, 0) and (0, 1), both ends joined.
-
-    Raises
-    ------
-    ValueError
-        Shapes disagree, a value is not finite, or the sequences are too long (n + m above 2^19).
-    """
-    from motionary.pipeline.distances import cost_matrix, dtw_path
-
-    moving, reference = checked_pair(moving, reference)
-    if weights is not None:
-        scale = np.sqrt(checked_weights(weights, reference.shape[1]))
-        moving, reference = moving * scale, reference * scale
-    return path_warp(dtw_path(cost_matrix(moving, reference)), len(moving))
 
 
 def path_warp(path: ArrayLike, moving_frames: int) -> PathWarp:

@@ -1,4 +1,4 @@
-"""How good a result is: clusters against known classes."""
+"""How good a result is: clusters against known classes, paths and warped sequences against known ones."""
 
 from motionary.pipeline.evaluation.clusters import (
     Purity,
@@ -8,12 +8,20 @@ from motionary.pipeline.evaluation.clusters import (
     purity,
     reward_punish,
 )
+from motionary.pipeline.evaluation.paths import longest_stay, path_deviation, path_error
+from motionary.pipeline.evaluation.trajectories import jerk, joint_trajectories, kendall_tau_similarity
 
 __all__ = [
     "Purity",
     "adjusted_rand_index",
     "best_reward_punish",
+    "jerk",
+    "joint_trajectories",
+    "kendall_tau_similarity",
+    "longest_stay",
     "normalised_mutual_information",
+    "path_deviation",
+    "path_error",
     "purity",
     "reward_punish",
 ]
