@@ -12,6 +12,9 @@ EXAMPLES = {
     "reproduce": (
         "motionary reproduce dtw-curve CATALOG",
         "motionary reproduce cotw CATALOG --draws 3 --format json",
+        "motionary reproduce gtw --draws 20",
+        "motionary reproduce fp-dtw  # on the embedded library",
+        "motionary reproduce adaptive-dtw CATALOG",
         "motionary reproduce assign CATALOG",
         "motionary reproduce style",
     )
@@ -20,19 +23,37 @@ EXAMPLES = {
 
 def reproduce(
     name: Annotated[
-        Literal["dtw-curve", "dtw-curve-better", "cotw", "style", "assign", "mutual"],
-        typer.Argument(metavar="NAME", help="dtw-curve, dtw-curve-better, cotw, style, assign or mutual."),
+        Literal[
+            "dtw-curve",
+            "dtw-curve-better",
+            "cotw",
+            "gtw",
+            "fp-dtw",
+            "adaptive-dtw",
+            "style",
+            "assign",
+            "mutual",
+        ],
+        typer.Argument(
+            metavar="NAME",
+            help="dtw-curve, dtw-curve-better, cotw, gtw, fp-dtw, adaptive-dtw, style, assign or mutual.",
+        ),
     ],
     catalog: Annotated[
-        str | None, typer.Argument(metavar="CATALOG", help="Labelled catalog; style needs none.")
+        str | None,
+        typer.Argument(
+            metavar="CATALOG",
+            help="Labelled catalog; gtw and style take none, fp-dtw and adaptive-dtw may do without.",
+        ),
     ] = None,
     draws: Annotated[
         int | None,
         typer.Option(
             "--draws",
             min=1,
-            help="Sets of clips drawn by each rule; for cotw, pairs of each action; for assign, partings.",
-            show_default="100, cotw 10, assign 5",
+            help="Sets drawn by each rule; for cotw, fp-dtw and adaptive-dtw pairs of each action; for style "
+            "takes of each, for assign partings.",
+            show_default="100, cotw 10, fp-dtw 20, adaptive-dtw 10, style 10, assign 5",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
@@ -44,32 +65,33 @@ def reproduce(
     """Repeat a paper's experiment on the labelled clips of CATALOG, or on the embedded library.
 
     dtw-curve: which distance, linkage and features find the classes. dtw-curve-better: changes to the
-    default. cotw: which alignment brings clips of one action together. style: how well styles are told apart
-    by what alignment leaves over, on made-up takes. assign: whether takes that are held out get their names.
-    mutual: whether ranking by mutual proximity finds a clip's action better.
+    default. cotw: which alignment brings clips of one action together. gtw: sequences distorted in time and
+    space. fp-dtw: following a live motion. adaptive-dtw: without standing still. style: how well styles are
+    told apart by what alignment leaves over, on made-up takes. assign: whether takes that are held out get
+    their names. mutual: whether ranking by mutual proximity finds a clip's action better.
     """
     from functools import partial
 
+    from threadpoolctl import threadpool_limits
+
     from motionary.workflows.progress import progress
+    from motionary.workflows.reproduce import EXPERIMENTS
     from motionary.workflows.tables import output_console, write_table
 
+    experiment = EXPERIMENTS[name]
+    if experiment.on == "made up" and catalog is not None:
+        raise typer.BadParameter(f"{name} makes up what it aligns and takes no CATALOG")
+    if experiment.on == "labelled" and catalog is None:
+        raise typer.BadParameter(f"{name} needs a labelled CATALOG")
     show = partial(progress, console=stderr_console())
-    if name == "style":
-        from motionary.workflows.reproduce.style import study_style, style_report
-
-        if catalog is not None:
-            raise typer.BadParameter("style is made on the embedded library and takes no CATALOG")
-        study = study_style(show, seed=seed)
-        printed = style_report(study)
-    else:
-        from motionary.workflows.reproduce import EXPERIMENTS
-
-        if catalog is None:
-            raise typer.BadParameter(f"{name} needs a labelled CATALOG")
-        conduct, report, usual = EXPERIMENTS[name]
-        experiment = conduct(open_catalog(catalog), label_column, draws or usual, seed, show)
-        study, printed = experiment.study, report(experiment)
+    how = (draws or experiment.draws, seed, show)
+    on: tuple = ()
+    if experiment.on != "made up":
+        on = (None if catalog is None else open_catalog(catalog), label_column)
+    # Times are compared, and products of matrices this small lose by being shared among threads.
+    with threadpool_limits(1):
+        conducted = experiment.conduct(*on, *how)
     if format_ == "table":
-        output_console().print(printed)
+        output_console().print(experiment.report(conducted))
     else:
-        write_table(study.to_arrow(), format_)
+        write_table(conducted.study.to_arrow(), format_)

@@ -25,6 +25,8 @@ from motionary.pipeline.alignment import (
     select_reference,
     uniform,
 )
+from motionary.pipeline.alignment.canonical_time_warping import canonical_time_warping
+from motionary.pipeline.alignment.dtw import derivative_dtw
 from motionary.pipeline.alignment.trajectories import computed_trajectories, roughness
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import interpolate
@@ -42,9 +44,11 @@ FIXED, KNOWN, REFERENCES = "fixed parameters", "known warps", "references"
 METHODS: Mapping[str, Method] = {
     "UTW": lambda moving, reference, weights: uniform(moving, reference),
     "DTW": dtw,
+    "DDTW": derivative_dtw,
+    "CTW": lambda moving, reference, weights: canonical_time_warping(moving, reference),  # finds its own
     "CoTW": cotw_search,
 }
-"""Those of the paper's five that there are, in its order; what is added here is in every table."""
+"""The paper's five, in its order; what is added here is in every table."""
 
 ANY_DISTORTION = "CoTW, alpha 0"
 WITH_ANY_DISTORTION: Mapping[str, Method] = {

@@ -44,7 +44,7 @@ PAPER = {
     "CTW": Published((0.76, 0.16), (0.48, 0.18), (1.25, 0.59), "p > .05", "t 3.45, p < .01"),
     "CoTW": Published((0.65, 0.15), (0.75, 0.08), (10.01, 7.61)),
 }
-_MISSING = "-"  # such as a method of the paper that is not there yet
+_MISSING = "-"  # such as a test of values that do not vary
 
 _LEGEND = (
     "Distance: absolute difference a frame and DOF, over the largest of the methods' within the action; "
@@ -94,12 +94,10 @@ def _methods_table(study: Measurements) -> RenderableType:
     distance, correlation = normalised_distance(study, part), study.by_action(part, "correlation")
     rows = []
     for name, paper in PAPER.items():
-        ours = [_MISSING] * 4
-        if name in METHODS:
-            ours = [_spread(distance[name]), "", _spread(correlation[name]), ""]
-            if name != "CoTW":
-                ours[1] = _test(-distance["CoTW"], -distance[name])
-                ours[3] = _test(correlation["CoTW"], correlation[name])
+        ours = [_spread(distance[name]), "", _spread(correlation[name]), ""]
+        if name != "CoTW":
+            ours[1] = _test(-distance["CoTW"], -distance[name])
+            ours[3] = _test(correlation["CoTW"], correlation[name])
         published = [
             _published(paper.distance), paper.distance_test, _published(paper.correlation),
             paper.correlation_test,
@@ -144,8 +142,8 @@ def _seconds_table(study: Measurements) -> RenderableType:
     rows = [
         [
             name,
-            _spread(found[name], digits=4) if name in METHODS else _MISSING,
-            _spread(fixed[name], digits=4) if name in METHODS and len(fixed) else _MISSING,
+            _spread(found[name], digits=4),
+            _spread(fixed[name], digits=4) if len(fixed) else _MISSING,
             _published(paper.seconds),
         ]
         for name, paper in PAPER.items()

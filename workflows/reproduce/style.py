@@ -127,6 +127,18 @@ class StyleStudy:
         return pa.Table.from_pylist(rows, schema=pa.schema(fields))
 
 
+@dataclass(frozen=True, eq=False)
+class StyleExperiment:
+    """The study, as experiments hand it on."""
+
+    study: StyleStudy
+
+
+def conduct_style(takes: int, seed: int, show: Show) -> StyleExperiment:
+    """Conduct `study_style` on all actions, by all methods."""
+    return StyleExperiment(study_style(show, takes, seed))
+
+
 def study_style(
     show: Show,
     takes: int = TAKES,

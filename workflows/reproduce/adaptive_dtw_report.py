@@ -1,0 +1,112 @@
+"""The adaptive DTW experiment in a terminal, beside what the paper says.
+
+**[ADTW]** Heloir, Courty, Gibet, Multon, *Temporal alignment of communicative gesture sequences*: Figure 3
+and the section on results. It has curves and words, no number; what it says of them stands beside ours.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+from rich.console import Group, RenderableType
+
+from motionary.workflows.reproduce.adaptive_dtw import AdaptiveExperiment
+from motionary.workflows.reproduce.adaptive_dtw_measures import (
+    ADAPTIVE,
+    CONSTRAINED,
+    LIMITED,
+    METHODS,
+    SEQUENCES,
+    SETTINGS,
+    TAKES,
+)
+from motionary.workflows.reproduce.cotw_measures import KNOWN, Measurements
+from motionary.workflows.tables import text_table
+
+PAPER = {
+    "DTW": "least distance, but jumps and stays",
+    LIMITED: "smooth, but cannot follow wide changes of tempo",
+    CONSTRAINED: "the recurrence it prints; not shown",
+    ADAPTIVE: "smooth, and still accurate",
+}
+"""The paper's judgements, as Figure 3 shows them."""
+
+_LEGEND = (
+    "Means over pairs. Deviation: from the plain DTW's path, in frames of the moving sequence; longest stay: "
+    "in frames;\njerk: of the first principal postures as shown, over the reference's own; distance: of what "
+    "is shown from the reference;\nseconds: of the path alone. The paper prints no numbers: what it says "
+    "stands beside ours."
+)
+_MEASURES = {"deviation": 2, "stay": 1, "jerk": 2, "distance": 3, "seconds": 4}
+_MISSING = "-"
+
+
+def adaptive_dtw_report(experiment: AdaptiveExperiment) -> RenderableType:
+    """Lay the experiment out for reading; all its numbers are `Measurements.to_arrow`."""
+    study = experiment.study
+    parts: list[RenderableType] = [*experiment.notes, _LEGEND]
+    titles = {TAKES: "Takes of one action", SEQUENCES: "Sequences: takes of every action, joined"}
+    for part, title in titles.items():
+        if not study.of(part, "stay").empty:
+            parts += ["", _methods_table(study, part, title)]
+    parts += ["", _known_table(study), "", _settings_table(study)]
+    if not study.of(SEQUENCES, "stay").empty:
+        parts += ["", *claims(study)]
+    return Group(*parts)
+
+
+def claims(study: Measurements) -> list[str]:
+    """Say of each of the paper's claims whether it holds on the sequences here, with the numbers."""
+    stay, jerks, away = (study.of(SEQUENCES, one).mean() for one in ("stay", "jerk", "deviation"))
+    constrained = [name for name in (LIMITED, CONSTRAINED) if name in away]
+    return [
+        _claim("adaptive DTW stands still for less long than DTW", stay[ADAPTIVE] < stay["DTW"]),
+        _claim("what it shows is less jerky than by DTW", jerks[ADAPTIVE] < jerks["DTW"]),
+        *(
+            _claim(f"it lies nearer to DTW's path than {name}", away[ADAPTIVE] < away[name])
+            for name in constrained
+        ),
+    ]
+
+
+def _claim(said: str, holds: bool) -> str:
+    return f"On the sequences {said}: {'holds' if holds else 'does not hold'}."
+
+
+def _methods_table(study: Measurements, part: str, title: str) -> RenderableType:
+    measured = {measure: study.of(part, measure) for measure in _MEASURES}
+    rows = [
+        [name, *(_mean(measured[one], name, digits) for one, digits in _MEASURES.items()), PAPER[name]]
+        for name in METHODS
+    ]
+    headings = ["deviation", "longest stay", "jerk", "distance", "seconds"]
+    pairs = len(measured["stay"])
+    missing = int(measured["stay"].get(LIMITED, pd.Series(index=range(pairs), dtype=float)).isna().sum())
+    said = f"{title}: {pairs} pairs"
+    if missing:
+        said += f"; of {missing} the lengths are too different for stays of 2 steps"
+    return text_table(["method", *headings, "the paper"], rows, said)
+
+
+def _known_table(study: Measurements) -> RenderableType:
+    errors = study.of(KNOWN, "error")
+    actions = errors.groupby(level="action").mean()
+    rows = [
+        [name, *(f"{value:.2f}" for value in [*actions[name], errors[name].mean()])]
+        for name in errors.columns
+    ]
+    title = "Known warps (embedded library): mean error of the times, in frames at 30 a second"
+    return text_table(["method", *actions.index, "all takes"], rows, title)
+
+
+def _settings_table(study: Measurements) -> RenderableType:
+    measured = {measure: study.of(SETTINGS, measure) for measure in _MEASURES}
+    rows = [
+        [name, *(_mean(measured[one], name, digits) for one, digits in _MEASURES.items())]
+        for name in measured["stay"].columns
+    ]
+    title = "Adaptive DTW by radius and K, which the paper does not name, on the takes"
+    return text_table(["settings", "deviation", "longest stay", "jerk", "distance", "seconds"], rows, title)
+
+
+def _mean(table: pd.DataFrame, name: str, digits: int) -> str:
+    return f"{table[name].mean():.{digits}f}" if name in table else _MISSING
