@@ -47,9 +47,11 @@ PUBLIC = {  # names that users import
         "pairwise_distances",
     ],
     "pipeline.clustering": ["complete_linkage", "fuzzy_linkage", "cut_tree", "threshold_strips"],
-    "pipeline.evaluation": ["reward_punish"],
+    "pipeline.evaluation": ["reward_punish", "path_error", "path_deviation", "kendall_tau_similarity"],
     "pipeline.alignment": [
         *("Warp", "uniform", "dtw", "cotw", "cotw_search", "similarity_index", "select_reference"),
+        *("derivative_dtw", "canonical_time_warping", "iterative_motion_warping", "adaptive_dtw"),
+        *("generalized_time_warping", "OnlineAligner"),
     ],
     "pipeline.style": ["residual", "StyleSpace", "transfer"],
     "catalog": ["Catalog", "CatalogError"],

@@ -49,7 +49,7 @@ def test_every_module_imports_and_says_what_it_is(top):
         assert import_module(name).__doc__, name
 
 
-@pytest.mark.parametrize("top", [*CODE, "catalog/views", "catalog/web"])
+@pytest.mark.parametrize("top", [*CODE, "pipeline/alignment", "catalog/views", "catalog/web"])
 def test_a_folders_readme_names_its_modules(top):
     text = (ROOT / top / "README.md").read_text()
     for named in re.findall(r"`([\w/]+\.py)`", text):

@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from motionary.workflows.commands import (
+    align,
     assign,
     browse,
     check,
@@ -71,6 +72,7 @@ for module in (
     similar,
     assign,
     explain,
+    align,
     take_out,
     snapshots,
     check,

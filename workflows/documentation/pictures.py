@@ -17,6 +17,9 @@ RUNS = ("run/run_neutral_dora_02.bvh", "run/run_sneaky_alex_01.bvh")
 _FENCE = "`" * 6
 
 
+_SHOWN_ALIGNERS = ("dtw", "derivative-dtw", "generalized-time-warping", "cotw")  # more would hide each other
+
+
 def picture_text(catalog: Catalog, name: str) -> str:
     """Make a picture, as Markdown that holds it.
 
@@ -113,6 +116,14 @@ def _warps(catalog: Catalog) -> go.Figure:
     return warp_figure(catalog, rows["clip_id"].to_pylist())
 
 
+def _aligners(catalog: Catalog) -> go.Figure:
+    from motionary.catalog.views.alignment_chart import warps_figure
+    from motionary.workflows.align_pair import align_pair, read_pair
+
+    reference, clip = _most_gained(catalog)
+    return warps_figure(align_pair(read_pair(clip, reference, catalog), _SHOWN_ALIGNERS).pair)
+
+
 def _trajectory(catalog: Catalog) -> go.Figure:
     from motionary.catalog.views.trajectory_chart import trajectory_figure
 
@@ -145,6 +156,7 @@ PICTURES: Mapping[str, Callable[[Catalog], go.Figure | str]] = {
     "map": _map,
     "confusion": _confusion,
     "warps": _warps,
+    "aligners": _aligners,
     "trajectory": _trajectory,
     "aligned-pair": _aligned_pair,
     "styles": _styles,
