@@ -313,7 +313,8 @@ def test_a_date_that_python_does_not_have_is_told_by_its_column(motionary, demo_
     [
         (["cotw"], "cotw needs a labelled CATALOG"),
         (["style", "somewhere"], "takes no CATALOG"),
-        (["dtw"], "'dtw' is not one of 'dtw-curve', 'dtw-curve-better', 'cotw', 'style'"),
+        (["gtw", "somewhere"], "takes no CATALOG"),
+        (["dtw"], "'dtw' is not one of 'dtw-curve', 'dtw-curve-better', 'cotw', 'gtw'"),
     ],
 )
 def test_reproduce_tells_what_an_experiment_is_made_on(motionary, arguments, problem):

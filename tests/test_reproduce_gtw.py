@@ -108,20 +108,6 @@ def test_a_small_study_measures_every_method_and_prints(silent_progress):
     assert "nan" not in said
 
 
-@pytest.mark.parametrize(
-    ("name", "takes", "said"),
-    [
-        ("gtw", ["CATALOG"], "takes no CATALOG"),
-        ("style", ["CATALOG"], "takes no"),
-        ("cotw", [], "needs a labelled"),
-    ],
-)
-def test_what_it_is_made_on_is_the_experiments(motionary, name, takes, said):
-    code, _, err = motionary("reproduce", name, *takes)
-    assert code == 2
-    assert said in err
-
-
 def printed(experiment):
     console = Console(file=io.StringIO(), width=250)
     console.print(gtw_report(experiment))

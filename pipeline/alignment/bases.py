@@ -25,8 +25,11 @@ from scipy.interpolate import BSpline
 
 from motionary.pipeline.motion import FloatArray
 
-USUAL_BASES: Mapping[str, int] = MappingProxyType({"constant": 1, "polynomial": 5, "tanh": 5})
-"""Five tanh and five polynomial functions [GTW 5.3], and the constant one for sub-sequences."""
+USUAL_BASES: Mapping[str, int] = MappingProxyType({"constant": 1, "polynomial": 3, "tanh": 3})
+"""Three tanh and three polynomial functions [GTW 5.2], and the constant one for sub-sequences."""
+
+MORE_BASES: Mapping[str, int] = MappingProxyType({"constant": 1, "polynomial": 5, "tanh": 5})
+"""Five of each, as [GTW 5.3] takes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from motionary.pipeline.alignment.bases import USUAL_BASES
+from motionary.pipeline.alignment.bases import MORE_BASES, USUAL_BASES
 from motionary.pipeline.alignment.composed import in_time_of
 from motionary.pipeline.alignment.generalized_alternation import (
     Alternation,
@@ -46,7 +46,7 @@ def generalized_time_warping(
     sequences: Sequence[FloatArray],
     bases: Mapping[str, int] = USUAL_BASES,
     smoothness: float = 0.0,
-    regularisation: float = 0.1,
+    regularisation: float = 0.6,
     kept: float = 0.9,
     start: Start = "coarse",
     ends: Ends | Sequence[Ends] = "fixed",
@@ -66,7 +66,9 @@ def generalized_time_warping(
         eta: price of squared frames a step.
     regularisation, kept : float
         lambda, and the share of correlation that is kept, as in `multiset_cca`. Where sequences have about as
-        many dimensions as frames, a small lambda finds agreement at any warps.
+        many dimensions as frames, as takes of motion capture do, a small lambda (the paper's .1) finds
+        agreement at any warps, and more functions a warp follow it; with few dimensions a small one sees
+        through more noise.
     start : {"coarse", "uniform"} or sequence of array (l,)
         Where to begin: at the better of uniform warps and those of thinned sequences, at uniform warps, or at
         a path of frames for every sequence.
@@ -114,10 +116,11 @@ def generalized_time_warping(
 
 
 def generalized_pair(moving: FloatArray, reference: FloatArray) -> Warp:
-    """Warp one sequence to another by GTW with its usual settings, but lambda = 1.
+    """Warp one sequence to another by GTW at lambda = 1, of five functions of each family.
 
     A pose has about as many columns as a short clip has frames, and nearly uniform warps already correlate at
-    a lambda of .1. By covariance, on what moves most, clips of one action come nearer to each other.
+    less. Two clips of one kind come nearer to each other by covariance, on what moves most; several kinds at
+    once do not.
 
     Parameters
     ----------
@@ -135,7 +138,7 @@ def generalized_pair(moving: FloatArray, reference: FloatArray) -> Warp:
         As `generalized_time_warping`.
     """
     pair = [checked_sequence(moving, "moving"), checked_sequence(reference, "reference")]
-    return in_time_of(generalized_time_warping(pair, regularisation=1.0).warps, 1)[0]
+    return in_time_of(generalized_time_warping(pair, MORE_BASES, regularisation=1.0).warps, 1)[0]
 
 
 def _checked(sequences: Sequence[FloatArray]) -> list[FloatArray]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -112,26 +113,25 @@ def time_step(
     if weights is None:
         weights = [uniform_weights(basis, one) for basis, one in zip(bases, limits, strict=True)]
     step = _GaussNewton(arrays, bases, joined_limits(limits), smoothness)
-    at = np.concatenate(weights)
-    errors, ended = [step.error(at)], "iterations"
+    at = step.at(np.concatenate(weights))
+    errors, ended = [at.error], "iterations"
     for _ in range(iterations):
         try:
             direction = step.direction(at)
         except UnsolvedError as problem:
             ended = str(problem)
             break
-        found = step.descent(at, direction, errors[-1])
+        found = step.descent(at, direction)
         if found is None:
             ended = "no descent"
             break
-        at, error = found
-        errors.append(error)
-        if errors[-2] - error <= _TOLERANCE * errors[-2]:
+        at = found
+        errors.append(at.error)
+        if errors[-2] - at.error <= _TOLERANCE * errors[-2]:
             ended = "converged"
             break
-    split = step.split(at)
-    warps = [Warp(basis.path(own), basis.frames) for basis, own in zip(bases, split, strict=True)]
-    return TimeStep(tuple(split), tuple(warps), np.array(errors), ended)
+    warps = [Warp(path, basis.frames) for basis, path in zip(bases, at.paths, strict=True)]
+    return TimeStep(tuple(step.split(at.weights)), tuple(warps), np.array(errors), ended)
 
 
 def warp_steps(frames: Sequence[int]) -> int:
@@ -142,6 +142,16 @@ def warp_steps(frames: Sequence[int]) -> int:
 def uniform_weights(basis: Basis, limits: WeightLimits) -> FloatArray:
     """Return the weights (k,) that come nearest to showing the sequence evenly from first to last frame."""
     return nearest_weights(basis, np.linspace(0, basis.frames - 1, len(basis.values)), limits)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Weights of all sequences one after the other, their paths, what these show (m, l, d), and J there."""
+
+    weights: FloatArray
+    paths: list[FloatArray]
+    shown: FloatArray
+    error: float
 
 
 class _GaussNewton:
@@ -159,75 +169,64 @@ class _GaussNewton:
         self._penalty = [smoothness * one.T @ one for one in rises]
 
     def split(self, weights: FloatArray) -> list[FloatArray]:
-        return np.split(weights, self._ends[1:-1])
+        return [weights[first:last] for first, last in pairwise(self._ends)]
 
-    def error(self, weights: FloatArray) -> float:
-        """Return J."""
-        shown = self._shown(self._paths(weights))
-        apart = shown - shown.mean(axis=0)
-        smooth = sum(
-            own @ penalty @ own for own, penalty in zip(self.split(weights), self._penalty, strict=True)
+    def at(self, weights: FloatArray) -> _Place:
+        """Return what weights lead to."""
+        each = self.split(weights)
+        paths = [basis.path(own) for basis, own in zip(self._bases, each, strict=True)]
+        shown = np.stack(
+            [interpolate(values, path) for values, path in zip(self._sequences, paths, strict=True)]
         )
-        return float(len(shown) * (apart**2).sum() + smooth)
+        apart = shown - shown.mean(axis=0)
+        smooth = sum(own @ penalty @ own for own, penalty in zip(each, self._penalty, strict=True))
+        return _Place(weights, paths, shown, float(len(shown) * (apart**2).sum() + smooth))
 
-    def programme(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def programme(self, at: _Place) -> tuple[FloatArray, FloatArray]:
         """Return H and f of eq. 6: half of J's second and first derivatives where Z' is constant.
 
         Written with the l values of Z_i' . Z_j' rather than the d l rows of G, so linear in l d.
         """
-        paths = self._paths(weights)
-        shown = self._shown(paths)
-        slopes = [self._slope(place, path) for place, path in enumerate(paths)]
-        apart = len(shown) * (shown - shown.mean(axis=0))
+        slopes = [self._slope(place, path) for place, path in enumerate(at.paths)]
+        sequences = len(slopes)
+        apart = sequences * (at.shown - at.shown.mean(axis=0))
         hessian = np.empty((self._ends[-1], self._ends[-1]))
         slope = np.empty(self._ends[-1])
-        own = self.split(weights)
+        own = self.split(at.weights)
         for i, basis in enumerate(self._bases):
             rows = slice(self._ends[i], self._ends[i + 1])
-            slope[rows] = basis.values.T @ (slopes[i] * apart[i]).sum(axis=1) + self._penalty[i] @ own[i]
+            slope[rows] = basis.values.T @ _dots(slopes[i], apart[i]) + self._penalty[i] @ own[i]
             for j, other in enumerate(self._bases[: i + 1]):
                 columns = slice(self._ends[j], self._ends[j + 1])
-                both = (slopes[i] * slopes[j]).sum(axis=1) * (len(shown) - 1 if i == j else -1)
+                both = _dots(slopes[i], slopes[j]) * (sequences - 1 if i == j else -1)
                 block = basis.values.T @ (both[:, None] * other.values)
                 hessian[rows, columns] = block + self._penalty[i] if i == j else block
                 hessian[columns, rows] = hessian[rows, columns].T
         return hessian, slope
 
-    def direction(self, weights: FloatArray) -> FloatArray:
+    def direction(self, at: _Place) -> FloatArray:
         """Return the weights' change that solves eq. 6."""
-        hessian, slope = self.programme(weights)
+        hessian, slope = self.programme(at)
         limits, scale = self._limits, self._scale
         return (
             solve_programme(
                 hessian / np.outer(scale, scale),
                 slope / scale,
                 limits.rows / scale,
-                np.maximum(limits.bounds - limits.rows @ weights, 0),  # rounding apart it is
+                np.maximum(limits.bounds - limits.rows @ at.weights, 0),  # rounding apart it is
                 limits.equal / scale,
-                limits.exact - limits.equal @ weights,
+                limits.exact - limits.equal @ at.weights,
             )
             / scale
         )
 
-    def descent(
-        self, weights: FloatArray, direction: FloatArray, error: float
-    ) -> tuple[FloatArray, float] | None:
-        """Return the first weights along a direction, of 1, 1/2, 1/4, ..., where J is less, and J there."""
+    def descent(self, at: _Place, direction: FloatArray) -> _Place | None:
+        """Return the first place along a direction, of 1, 1/2, 1/4, ... of it, where J is less."""
         for halvings in range(_HALVINGS + 1):
-            ahead = weights + direction * 0.5**halvings
-            lower = self.error(ahead)
-            if lower < error:
-                return ahead, lower
+            ahead = self.at(at.weights + direction * 0.5**halvings)
+            if ahead.error < at.error:
+                return ahead
         return None
-
-    def _paths(self, weights: FloatArray) -> list[FloatArray]:
-        return [basis.path(own) for basis, own in zip(self._bases, self.split(weights), strict=True)]
-
-    def _shown(self, paths: list[FloatArray]) -> FloatArray:
-        """Return the sequences along their paths, (m, l, d)."""
-        return np.stack(
-            [interpolate(values, path) for values, path in zip(self._sequences, paths, strict=True)]
-        )
 
     def _slope(self, place: int, path: FloatArray) -> FloatArray:
         """Return Z' along a path, (l, d): of the piece, or the mean of both pieces that meet at a frame."""
@@ -235,6 +234,12 @@ class _GaussNewton:
         after = slopes[np.minimum(path.astype(np.intp), len(slopes) - 1)]
         before = slopes[np.maximum(np.ceil(path).astype(np.intp) - 1, 0)]
         return (after + before) / 2
+
+
+def _dots(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the products of vectors (l, d) step by step, (l,)."""
+    products: FloatArray = np.einsum("ld,ld->l", one, other)
+    return products
 
 
 def _checked(sequences: Sequence[FloatArray], bases: Sequence[Basis]) -> list[FloatArray]:

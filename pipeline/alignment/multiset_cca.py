@@ -7,7 +7,9 @@ agree best (eq. 8):
                                                D = diag((1 - lambda) X_i^T X_i + lambda I)
 
 a generalised eigenproblem, C V = D V Lambda. At lambda = 0 its eigenvalues lie between -1 and m - 1 for m
-sequences; for two they are the canonical correlations. Three things that the paper leaves open:
+sequences; for two they are the canonical correlations. Eq. 7 put into eq. 2 would leave the sequences' own products in
+C; where lambda is 0 they add the same to any V, else the printed C, without them, is what counts here. Three
+things that the paper leaves open:
 
 - every sequence is centred first; eq. 2 compares them as they are, which would make a common offset the
   first thing that they agree in;
@@ -191,15 +193,22 @@ def _scale(centred: FloatArray) -> float:
 def _whitened(centred: FloatArray, regularisation: float, place: int) -> tuple[FloatArray, FloatArray]:
     """Return B (d_i, r) with B^T D_i B = I over the directions that vary, and ``centred @ B`` (l, r)."""
     scale = _scale(centred)
-    left, singular, right = np.linalg.svd(centred / scale, full_matrices=False)
-    varies = singular > _NO_VARIANCE * max(singular[0], 1.0)
+    scaled = centred / scale
+    if regularisation and len(scaled) > scaled.shape[1]:
+        # Squares lose what is small beside the greatest, and lambda outweighs it; long sequences gain by it.
+        squares, axes = np.linalg.eigh(scaled.T @ scaled)
+        singular = np.sqrt(np.maximum(squares, 0))
+        scores = scaled @ axes
+    else:
+        left, singular, right = np.linalg.svd(scaled, full_matrices=False)
+        axes, scores = right.T, left * singular
+    varies = singular > _NO_VARIANCE * max(singular.max(), 1.0)
     if not varies.any():
         raise ValueError(
             f"sequence {place} does not vary over its {len(centred)} steps; nothing correlates with it"
         )
-    singular = singular[varies]
-    weight = 1 / np.sqrt((1 - regularisation) * singular**2 + regularisation)
-    return right[varies].T * (weight / scale), left[:, varies] * (weight * singular)
+    weight = 1 / np.sqrt((1 - regularisation) * singular[varies] ** 2 + regularisation)
+    return axes[:, varies] * (weight / scale), scores[:, varies] * weight
 
 
 def _dimensions(falling: FloatArray, kept: float) -> int:

@@ -8,6 +8,7 @@ Small and dense here: a row and a column a weight of a warp.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from motionary.pipeline.motion import FloatArray
 
@@ -52,7 +53,6 @@ def solve_programme(
         It ended otherwise than solved: what was asked has no solution, or rounding stood in the way.
     """
     import clarabel
-    from scipy import sparse
 
     # The solver's tolerances are absolute as well as relative, so the objective is brought to about 1.
     scale = max(float(np.abs(hessian).max(initial=0)), float(np.abs(slope).max(initial=0)))
@@ -62,9 +62,9 @@ def solve_programme(
     settings.verbose = False
     settings.max_threads = 1
     solver = clarabel.DefaultSolver(
-        sparse.triu(sparse.csc_matrix(hessian), format="csc"),
+        _by_columns(np.triu(hessian)),
         np.ascontiguousarray(slope),
-        sparse.csc_matrix(np.concatenate([equal, rows])),
+        _by_columns(np.concatenate([equal, rows])),
         np.concatenate([exact, bounds]),
         [clarabel.ZeroConeT(len(equal)), clarabel.NonnegativeConeT(len(rows))],
         settings,
@@ -76,3 +76,10 @@ def solve_programme(
             f"after {solution.iterations} iterations"
         )
     return np.array(solution.x)
+
+
+def _by_columns(matrix: FloatArray) -> csc_matrix:
+    """Return a matrix as the solver takes it; SciPy's own way from a dense one takes as long as the solver."""
+    columns, rows = np.nonzero(matrix.T)
+    begins = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
+    return csc_matrix((matrix[rows, columns], rows, begins), shape=matrix.shape)

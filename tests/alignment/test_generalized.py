@@ -86,9 +86,9 @@ def gauss_newton(sequences: list[np.ndarray], bases: list[Basis], smoothness: fl
 def test_the_programme_is_that_of_equation_6(seed: int, smoothness: float) -> None:
     sequences, bases, weights = random_problem(seed)
     step = gauss_newton(sequences, bases, smoothness)
-    joined = np.concatenate(weights)
-    assert step.error(joined) == pytest.approx(equation_3(sequences, bases, weights, smoothness))
-    hessian, slope = step.programme(joined)
+    at = step.at(np.concatenate(weights))
+    assert at.error == pytest.approx(equation_3(sequences, bases, weights, smoothness))
+    hessian, slope = step.programme(at)
     expected = equation_6(sequences, bases, weights, smoothness)
     np.testing.assert_allclose(hessian, expected[0], rtol=1e-5, atol=1e-5 * np.abs(expected[0]).max())
     np.testing.assert_allclose(slope, expected[1], rtol=1e-5, atol=1e-5 * np.abs(expected[1]).max())
@@ -98,12 +98,12 @@ def test_twice_f_is_the_slope_of_equation_3() -> None:
     sequences, bases, weights = random_problem(7)
     step = gauss_newton(sequences, bases, 0.2)
     joined, small = np.concatenate(weights), 1e-7
-    _, slope = step.programme(joined)
+    _, slope = step.programme(step.at(joined))
     for place in range(len(joined)):
         ahead, behind = joined.copy(), joined.copy()
         ahead[place] += small
         behind[place] -= small
-        difference = (step.error(ahead) - step.error(behind)) / (2 * small)
+        difference = (step.at(ahead).error - step.at(behind).error) / (2 * small)
         assert difference == pytest.approx(2 * slope[place], rel=1e-3, abs=1e-3 * np.abs(slope).max())
 
 

@@ -92,6 +92,20 @@ def test_constant_and_collinear_dimensions_change_nothing(regularisation: float)
     np.testing.assert_array_equal(with_constant.projections[0][3], 0)
 
 
+@pytest.mark.parametrize("regularisation", [1e-6, 0.1, 1.0])
+def test_more_steps_than_dimensions_are_no_other_case(regularisation: float) -> None:
+    # Dimensions of zeros leave the rest as it is, but for lambda's scale and the way that is taken to whiten.
+    rng = np.random.default_rng(6)
+    sequences = [rng.normal(size=(9, 4)).cumsum(axis=0) * np.geomspace(1, 1e-5, 4) for _ in range(3)]
+    for padded in (4, 40):
+        wide = [np.hstack([one, np.zeros((9, padded - 4))]) for one in sequences]
+        spectrum = multiset_cca(wide, regularisation).spectrum
+        expected = eigh(*equation_8(wide, regularisation), eigvals_only=True)[::-1]
+        assert len(spectrum) == 12
+        positive = spectrum > 1e-4
+        np.testing.assert_allclose(spectrum[positive], expected[: positive.sum()], atol=1e-8)
+
+
 def test_units_do_not_matter_and_signs_are_fixed() -> None:
     sequences = of_one_kind(5)
     found = multiset_cca(sequences, 0.2)
