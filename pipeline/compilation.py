@@ -34,13 +34,16 @@ import numpy as np
 
 _MODULES = (
     "motionary.pipeline.alignment.agreement_kernels",
+    "motionary.pipeline.alignment.banded_kernels",
     "motionary.pipeline.alignment.correlation_kernels",
     "motionary.pipeline.alignment.cotw_kernels",
+    "motionary.pipeline.alignment.limited_kernels",
+    "motionary.pipeline.alignment.online_kernels",
     "motionary.pipeline.alignment.whole_output_kernels",
     "motionary.pipeline.clustering.linkage_kernels",
     "motionary.pipeline.distances.pairwise",
 )
-"""Modules that name kernels of the main job, at least one of each folder that holds some."""
+"""Modules that name kernels of the commands, at least one of each folder that holds some."""
 
 _LOCK = "motionary-kernels.lock"
 _PATIENCE = 600.0  # seconds to wait for another process, which needs some twenty
@@ -72,7 +75,7 @@ def kernel_cache() -> KernelCache:
 
 
 def compile_kernels(announce: Callable[[], object]) -> None:
-    """Compile every kernel of the main job, unless that has been done on this machine.
+    """Compile every kernel that a command calls, unless that has been done on this machine.
 
     The work is done by a process of its own: this one may have loaded code of older sources already.
 
@@ -113,8 +116,9 @@ def _compile_in_this_process() -> None:
 
 
 def _call_every_kernel() -> None:
-    """Call what runs and questions call, with their types: features float32, condensed distances float64."""
+    """Call what commands call, with their types: features float32, rotations and distances float64."""
     from motionary.pipeline.alignment import cotw, cotw_search
+    from motionary.pipeline.alignment.registry import ALIGNERS
     from motionary.pipeline.clustering import complete_linkage, fuzzy_linkage
     from motionary.pipeline.distances import compare_clips, pairwise_distances
     from motionary.pipeline.distances.explain import explain_pair, feature_parts
@@ -134,6 +138,10 @@ def _call_every_kernel() -> None:
     # Long enough for a coarse version and its refinement.
     moving, reference = (random.random((frames, 59), dtype=np.float32) for frames in (30, 100))
     cotw_search(moving, reference, effort="fast")
+    quaternions = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (9, 2, 4))
+    values = {"features": clips[0], "postures": clips[0].astype(np.float64), "rotations": quaternions}
+    for aligner in ALIGNERS.values():
+        aligner.align(values[aligner.reads], values[aligner.reads])
 
 
 @cache

@@ -9,9 +9,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pyarrow.parquet as pq
 import pytest
+
+from motionary.workflows.commands.reproduce import reproduce
+from motionary.workflows.reproduce import EXPERIMENTS
 
 
 def test_help_answers_without_the_numerical_stack():
@@ -226,6 +230,13 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog, sql, format
     assert shown.returncode == 128 + signal.SIGPIPE
 
 
+def test_an_answer_that_can_go_nowhere_is_refused_before_the_work():
+    command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' align one.bvh other.bvh"
+    shown = subprocess.run(f"{command} >&-", shell=True, capture_output=True, text=True, check=False)
+    assert (shown.returncode, shown.stderr.count("\n")) == (1, 1)
+    assert "standard output is closed" in shown.stderr
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 @pytest.mark.parametrize("format_", ["csv", "table"])
 def test_an_answer_that_finds_no_room_is_a_failure(demo_catalog, format_):
@@ -324,6 +335,10 @@ def test_reproduce_tells_what_an_experiment_is_made_on(motionary, arguments, pro
 
 
 @pytest.mark.slow
+def test_reproduce_names_every_experiment():
+    assert set(get_args(get_type_hints(reproduce)["name"])) == set(EXPERIMENTS)
+
+
 def test_reproduce_cotw_prints_its_tables_and_writes_its_values(motionary, demo_catalog):
     code, out, _ = motionary("reproduce", "cotw", demo_catalog, "--draws", 1)
     assert code == 0

@@ -86,6 +86,8 @@ app.add_typer(label.label, name="label")
 
 def main() -> NoReturn:
     """Run the command line and exit; what a user can mend is one line on stderr and exit code 1."""
+    if sys.stdout is None:
+        fail("standard output is closed, and answers are written there; redirect it, if only to /dev/null")
     try:
         _answer()
     except BrokenPipeError:  # the reader has seen enough; nothing more may be written, at exit neither

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from motionary.workflows.commands.options import OutputFormat, open_catalog, stderr_console
+from motionary.workflows.commands.options import OutputFormat, compile_first, open_catalog, stderr_console
 
 EXAMPLES = {
     "reproduce": (
@@ -83,6 +83,7 @@ def reproduce(
         raise typer.BadParameter(f"{name} makes up what it aligns and takes no CATALOG")
     if experiment.on == "labelled" and catalog is None:
         raise typer.BadParameter(f"{name} needs a labelled CATALOG")
+    compile_first()
     show = partial(progress, console=stderr_console())
     how = (draws or experiment.draws, seed, show)
     on: tuple = ()

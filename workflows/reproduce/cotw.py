@@ -78,7 +78,6 @@ def study_cotw(catalog: Catalog, label_column: str, draws: int, seed: int, show:
     rate = catalog.config.features.frame_rate
     pairs = sum(len(list(action)) for action in actions)
     stages = {"read": len(paired), "align": 2 * pairs, "known warps": len(takes), "references": len(actions)}
-    # Canonical correlations are small problems: on a busy machine threads wait for each other in every one.
     with show(stages) as advance:
         angles, skeletons = {}, {}
         for clip_id in paired:
