@@ -231,7 +231,7 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(demo_catalog, sql, format
 
 
 def test_an_answer_that_can_go_nowhere_is_refused_before_the_work():
-    command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' align one.bvh other.bvh"
+    command = f"{sys.executable} -c 'from motionary.workflows.cli import main; main()' align a.bvh b.bvh"
     shown = subprocess.run(f"{command} >&-", shell=True, capture_output=True, text=True, check=False)
     assert (shown.returncode, shown.stderr.count("\n")) == (1, 1)
     assert "standard output is closed" in shown.stderr

@@ -7,9 +7,9 @@ agree best (eq. 8):
                                                D = diag((1 - lambda) X_i^T X_i + lambda I)
 
 a generalised eigenproblem, C V = D V Lambda. At lambda = 0 its eigenvalues lie between -1 and m - 1 for m
-sequences; for two they are the canonical correlations. Eq. 7 put into eq. 2 would leave the sequences' own products in
-C; where lambda is 0 they add the same to any V, else the printed C, without them, is what counts here. Three
-things that the paper leaves open:
+sequences; for two they are the canonical correlations. Eq. 7 put into eq. 2 would leave the sequences' own
+products in C; at lambda = 0 they add the same to any V, else C as it is printed, without them, is what counts
+here. Three things that the paper leaves open:
 
 - every sequence is centred first; eq. 2 compares them as they are, which would make a common offset the
   first thing that they agree in;

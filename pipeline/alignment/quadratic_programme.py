@@ -79,7 +79,7 @@ def solve_programme(
 
 
 def _by_columns(matrix: FloatArray) -> csc_matrix:
-    """Return a matrix as the solver takes it; SciPy's own way from a dense one takes as long as the solver."""
+    """Return a matrix as the solver takes it; SciPy's own way there takes as long as the solver."""
     columns, rows = np.nonzero(matrix.T)
     begins = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
     return csc_matrix((matrix[rows, columns], rows, begins), shape=matrix.shape)

@@ -205,6 +205,7 @@ def test_a_motion_is_found_within_a_longer_sequence() -> None:
         begin: generalized_time_warping(
             [whole, part],
             start=[np.linspace(begin, begin + frames - 1, steps), np.linspace(0, frames - 1, steps)],
+            regularisation=0.1,
             ends=("relaxed", "fixed"),
             least_share=0.2,
         )
