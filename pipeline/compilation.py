@@ -31,6 +31,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 _MODULES = (
     "motionary.pipeline.alignment.agreement_kernels",
@@ -139,7 +140,11 @@ def _call_every_kernel() -> None:
     moving, reference = (random.random((frames, 59), dtype=np.float32) for frames in (30, 100))
     cotw_search(moving, reference, effort="fast")
     quaternions = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (9, 2, 4))
-    values = {"features": clips[0], "postures": clips[0].astype(np.float64), "rotations": quaternions}
+    values: dict[str, NDArray[Any]] = {
+        "features": clips[0],
+        "postures": clips[0].astype(np.float64),
+        "rotations": quaternions,
+    }
     for aligner in ALIGNERS.values():
         aligner.align(values[aligner.reads], values[aligner.reads])
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention, canonical_indices, find_convention
 from motionary.pipeline.features import at_rate
-from motionary.pipeline.motion import Motion
+from motionary.pipeline.motion import Motion, Skeleton
 
 FP_JOINTS: tuple[str, ...] = (
     "left_hip",
@@ -29,6 +29,8 @@ FP_JOINTS: tuple[str, ...] = (
     "right_elbow",
 )
 """The joints that [FP 4] compares, each weighing the same."""
+
+_BONE_ENDS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}
 
 
 def joint_rotations(
@@ -62,11 +64,7 @@ def joint_rotations(
     UnknownSkeletonError
         No convention fits the skeleton.
     """
-    if motion.places is not None:
-        raise ValueError(
-            f"{motion.name!r} was captured as markers, which have no rotations: "
-            "give it as BVH, ASF/AMC or AMASS, or align it by a method that reads features"
-        )
+    refuse_markers(motion)
     unknown = [joint for joint in joints if joint not in CANONICAL_JOINTS]
     if unknown or not joints:
         what = f"no canonical joint is called {unknown[0]!r}" if unknown else "no joint is named"
@@ -76,3 +74,67 @@ def joint_rotations(
     own = canonical_indices(motion.skeleton, find_convention(motion.skeleton.names, conventions))
     shown = motion if rate is None else at_rate(motion, rate)
     return np.ascontiguousarray(shown.rotations[:, own[[CANONICAL_JOINTS.index(joint) for joint in joints]]])
+
+
+def refuse_other_joints(moving: Motion, reference: Motion) -> None:
+    """Raise ValueError where two motions have other joints, and so local rotations that do not compare."""
+    strange = sorted(set(moving.skeleton.names) ^ set(reference.skeleton.names))
+    if strange:
+        raise ValueError(
+            f"motions {moving.name!r} and {reference.name!r} have other joints: {', '.join(strange[:6])}"
+            f"{' ...' if len(strange) > 6 else ''} in one alone; "
+            "align them by a method that reads features"
+        )
+
+
+def refuse_markers(motion: Motion) -> None:
+    """Raise ValueError where a motion was captured as markers, whose joints have places and no rotations."""
+    if motion.places is not None:
+        raise ValueError(
+            f"{motion.name!r} was captured as markers, which have no rotations: "
+            "give it as BVH, ASF/AMC or AMASS, or align it by a method that reads features"
+        )
+
+
+def bone_directions(skeleton: Skeleton, conventions: Iterable[Convention] = ()) -> NDArray[np.float64]:
+    """Return where the bones of `FP_JOINTS` point at rest, each in its joint's own frame.
+
+    A limb may have joints between, such as those of a twist; at rest they are not turned.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Any that a joint-name convention fits.
+    conventions : iterable of Convention
+        A user's own, tried before the built-in ones.
+
+    Returns
+    -------
+    array (8, 3)
+        Of length 1.
+
+    Raises
+    ------
+    ValueError
+        A bone has no length.
+    UnknownSkeletonError
+        No convention fits the skeleton.
+    """
+    own = canonical_indices(skeleton, find_convention(skeleton.names, conventions))
+    joint_of = dict(zip(CANONICAL_JOINTS, own.tolist(), strict=True))
+    directions = np.empty((len(FP_JOINTS), 3))
+    for place, name in enumerate(FP_JOINTS):
+        side, part = name.split("_")
+        start, joint = joint_of[name], joint_of[f"{side}_{_BONE_ENDS[part]}"]
+        reach = np.zeros(3)
+        while joint not in (start, -1):
+            reach += skeleton.offsets[joint]
+            joint = skeleton.parents[joint]
+        length = np.linalg.norm(reach)
+        if not length > 0:
+            raise ValueError(
+                f"the bone that begins at {skeleton.names[start]!r} has length {length:g}, so it points "
+                "nowhere: give the skeleton offsets of its joints"
+            )
+        directions[place] = reach / length
+    return directions

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 
@@ -12,9 +13,11 @@ import pytest
 from motionary.catalog import Catalog
 from motionary.catalog.views import alignment_chart
 from motionary.catalog.views.aligned_pair import STRETCHED, AlignedPair, Take
-from motionary.catalog.views.alignment_chart import liveliest_ways, warps_figure, ways_figure
+from motionary.catalog.views.alignment_chart import warps_figure
 from motionary.catalog.views.alignment_page import alignment_page
-from motionary.pipeline.alignment import cotw_search, dtw, uniform
+from motionary.catalog.views.alignment_ways import liveliest_ways, ways_figure
+from motionary.pipeline.alignment import adaptive_dtw, cotw_search, dtw, roughness, uniform
+from motionary.pipeline.alignment.postures import linearised_postures, posture_weights
 from motionary.pipeline.alignment.registry import ALIGNERS, Aligner
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.distances import cost_matrix
@@ -54,7 +57,14 @@ def scores(motionary):
 
 
 def test_the_names_that_help_lists_are_those_of_the_registry():
-    assert tuple(ALIGNERS) == METHODS
+    assert {name: one.title for name, one in ALIGNERS.items()} == METHODS
+    assert list(METHODS) == list(ALIGNERS)
+
+
+def test_a_method_may_be_called_as_its_paper_or_its_function_calls_it(scores, demo_catalog):
+    asked = ("--method", "DDTW", "--method", "canonical_time_warping", "--method", "Online A")
+    found = scores(demo_catalog, TIRED, WALK, *asked)
+    assert list(found) == ["uniform", "derivative-dtw", "canonical-time-warping", "online-a"]
 
 
 def test_scores_are_those_of_the_warps(scores, pair, demo_catalog):
@@ -76,8 +86,38 @@ def test_scores_are_those_of_the_warps(scores, pair, demo_catalog):
         with np.errstate(invalid="ignore"):
             each = [np.corrcoef(warped[:, k], reference[:, k])[0, 1] for k in moves]
         assert row["correlation"] == pytest.approx(np.nan_to_num(each).mean(), abs=1e-5)
+        assert row["roughness"] == pytest.approx(roughness(warped))
+        held = [0]
+        for earlier, later in pairwise(warp.source_time.round(6)):
+            held.append(held[-1] + 1 if earlier == later else 0)
+        assert row["longest_still"] == pytest.approx(max(held) / 30)
+        leaps = [later - earlier for earlier, later in pairwise(warp.source_time)]
+        assert row["longest_leap"] == pytest.approx(max(leaps) / 30)
     assert found["cotw"]["correlation"] >= found["uniform"]["correlation"]
     assert found["dtw"]["from_dtw"] == 0
+
+
+def test_what_reads_postures_is_given_them_weighted_by_limb(pair):
+    made = align_pair.align_pair(replace(pair, warps={}), ["adaptive-dtw"])
+    motions = pair.moving.motion, pair.reference.motion
+    postures = linearised_postures(*motions, 30.0)
+    expected = adaptive_dtw(*postures, posture_weights(motions[1].skeleton))
+    found = made.pair.warps[ALIGNERS["adaptive-dtw"].title]
+    np.testing.assert_array_equal(found.path, expected.path)
+    assert not np.array_equal(adaptive_dtw(*postures).path, expected.path)
+
+
+def test_the_seconds_are_those_of_the_method_alone(pair, monkeypatch):
+    clock = [100.0]
+
+    def slow(moving, reference):
+        clock[0] += 3.0
+        return uniform(moving, reference)
+
+    monkeypatch.setattr(align_pair, "perf_counter", lambda: clock[0])
+    register(monkeypatch, Aligner("slow", "Slow", "none", "features", slow))
+    rows = align_pair.align_pair(pair, ["slow"]).scores.to_pylist()
+    assert [(row["method"], row["seconds"]) for row in rows] == [("uniform", 0.0), ("slow", 3.0)]
 
 
 def test_a_clip_is_itself_in_its_own_time(scores, demo_catalog):
@@ -95,30 +135,35 @@ def test_files_and_clips_score_alike(scores, demo_catalog, demo_library):
             assert others == pytest.approx([of_files] * 2, rel=1e-5)
 
 
-def test_a_still_figure_is_told(motionary, monkeypatch, demo_library, tmp_path, scores):
+def test_a_still_figure_is_told(tmp_path, scores):
     walk = template("walk")
     frames = [*range(20), *[20] * 15, *range(20, 40)]
     write_bvh(shown(walk, list(range(40))), tmp_path / "plain.bvh")
     write_bvh(shown(walk, frames), tmp_path / "halting.bvh")
     found = scores(tmp_path / "plain.bvh", tmp_path / "halting.bvh", "--method", "dtw")
-    assert found["dtw"]["longest_still"] == pytest.approx(15 * walk.fps / 30 / walk.fps, abs=0.04)
+    assert found["dtw"]["longest_still"] == pytest.approx(15 / walk.fps, abs=0.04)
     assert found["uniform"]["longest_still"] == 0
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("frames", [1, 2])
-def test_one_and_two_frames_are_scored_or_refused(motionary, tmp_path, demo_library, method, frames):
+def test_one_and_two_frames_are_scored_or_refused(tmp_path, demo_library, method, frames):
     write_bvh(shown(template("walk"), list(range(0, 4 * frames, 4))), tmp_path / "short.bvh")
-    for names in (["short.bvh", "long.bvh"], ["long.bvh", "short.bvh"]):
-        (tmp_path / "long.bvh").write_bytes((demo_library / WALK).read_bytes())
-        given = [tmp_path / name for name in names]
-        code, printed, told = motionary("align", *given, "--method", method, "--format", "json")
-        if code == 0:
-            for row in json.loads(printed):
-                assert np.isfinite(row["distance"])
-        else:
-            assert code == 1
-            assert f"{method} cannot align" in told
+    both = str(tmp_path / "short.bvh"), str(demo_library / WALK)
+    for names in (both, both[::-1]):
+        made = align_pair.align_pair(read_pair(*names), [method], lenient=True)
+        assert all(made.refused.values())
+        scored = [row["method"] for row in made.scores.to_pylist()]
+        assert sorted([*scored, *made.refused]) == sorted({"uniform", method})
+        assert np.isfinite(made.scores["distance"]).all()
+
+
+def test_a_single_frame_that_a_method_refuses_ends_the_command(motionary, tmp_path, demo_library):
+    write_bvh(shown(template("walk"), [0]), tmp_path / "short.bvh")
+    given = tmp_path / "short.bvh", demo_library / WALK
+    code, printed, told = motionary("align", *given, "--method", "dtw-itakura")
+    assert (code, printed) == (1, "")
+    assert "dtw-itakura cannot align" in told
 
 
 def test_markers_are_aligned_by_features_alone(markers, pair, monkeypatch):
@@ -135,15 +180,32 @@ def test_markers_are_aligned_by_features_alone(markers, pair, monkeypatch):
     made = align_pair.align_pair(mixed, ["turned", "dtw"], lenient=True)
     assert [*made.refused] == ["turned"]
     assert [*made.pair.warps] == ["DTW"]
+    shown = alignment_page(made.pair, made.scores, made.refused)
+    assert "Left out: 1" in shown
+    assert "markers" in shown
+
+
+def test_of_many_methods_those_that_bring_the_two_nearest_come_first(pair):
+    made = align_pair.align_pair(pair, ["online-a", "dtw", "cotw", "derivative-dtw"])
+    correlation = dict(
+        zip(made.scores["title"].to_pylist(), made.scores["correlation"].to_pylist(), strict=True)
+    )
+    found = [correlation[title] for title in made.pair.warps]
+    assert found == sorted(found, reverse=True)
+    assert len(found) == 4
 
 
 def test_skeletons_that_differ_are_refused_by_what_reads_postures(monkeypatch, motionary, demo_library):
     register(monkeypatch, Aligner("limbs", "Limbs", "none", "postures", uniform))
-    monkeypatch.setattr("motionary.workflows.commands.align.METHODS", (*METHODS, "limbs"))
+    monkeypatch.setattr("motionary.workflows.commands.align.METHODS", METHODS | {"limbs": "limbs"})
     given = (demo_library / WALK, other_rig(demo_library))
     code, printed, told = motionary("align", *given, "--method", "limbs")
     assert (code, printed) == (1, "")
     assert "limbs cannot align" in told
+    code, printed, refused = motionary("align", *given, "--method", "online-c")
+    assert (code, printed) == (1, "")
+    assert "online-c cannot align" in refused
+    assert "other joints" in refused
     assert f"these read features: {ALIGNERS['uniform'].name}, dtw" in told
     code, printed, told = motionary("align", *given, "--method", "all")
     assert code == 0
@@ -271,8 +333,8 @@ def test_more_methods_than_fit_wait_in_the_legend(pair):
     assert shown == [True] * 5 + ["legendonly"] * 9
     looks = [(one.line.color, one.line.dash) for one in ways_figure(many, [("head", 0)]).data]
     assert len(set(looks)) == len(looks)
-    held = alignment_page(many, SCORES.empty_table())
-    assert "Only the first 3 methods play here" in held
+    held = alignment_page(many, SCORES.empty_table(), {})
+    assert "Only the 3 of greatest correlation play here" in held
 
 
 def test_the_liveliest_is_drawn_in_the_direction_in_which_it_moves(pair):
@@ -285,7 +347,7 @@ def test_the_liveliest_is_drawn_in_the_direction_in_which_it_moves(pair):
 def test_a_single_frame_makes_a_page(pair):
     one = Take("one", shown(pair.moving.motion, [3]), pair.moving.pose[3:4])
     for short in (replace(pair, moving=one, warps={}), replace(pair, reference=one, warps={})):
-        assert "still, no correlation" in alignment_page(short, SCORES.empty_table())
+        assert "still, no correlation" in alignment_page(short, SCORES.empty_table(), {})
 
 
 def test_names_lose_their_folders_where_that_tells_them_apart(pair):

@@ -81,7 +81,7 @@ def test_longest_stay_against_a_walk_along_the_path(steps):
         (np.zeros((0, 2)), r"path_a has shape \(0, 2\)"),
         (np.zeros(5), r"path_a has shape \(5,\)"),
         (np.zeros((3, 3)), "path_a has 3 sequences and path_b 2"),
-        (np.array([[0, 0], [1, np.nan]]), "path_a holds nan at step 1, sequence 1"),
+        (np.array([[0, 0], [1, np.nan]]), "path_a holds nan at frame 1, DOF 1"),
         (np.array([["0", "1"]]), "real numbers"),
     ],
 )
@@ -93,11 +93,12 @@ def test_path_error_refuses_what_is_no_path(path, what):
 def test_path_deviation_refuses_other_targets():
     with pytest.raises(ValueError, match="3 target frames and source_b 4"):
         path_deviation(np.zeros(3), np.zeros(4))
-    with pytest.raises(ValueError, match="source_b holds inf at target frame 2"):
+    with pytest.raises(ValueError, match="source_b holds inf at frame 2"):
         path_deviation(np.zeros(3), np.array([0, 0, np.inf]))
-    for wrong in (np.zeros((3, 2)), np.zeros(0)):
-        with pytest.raises(ValueError, match=r"source_a has shape .* it needs \(target frames\)"):
-            path_deviation(wrong, np.zeros(3))
+    with pytest.raises(ValueError, match=r"source_a has shape \(3, 2\); it needs one time a target frame"):
+        path_deviation(np.zeros((3, 2)), np.zeros(3))
+    with pytest.raises(ValueError, match="source_a has shape .* at least one"):
+        path_deviation(np.zeros(0), np.zeros(3))
 
 
 def test_longest_stay_refuses_a_path_that_falls():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from motionary.pipeline.evaluation import jerk, joint_trajectories, kendall_tau_similarity
+from motionary.pipeline.evaluation import jerk, joint_trajectories, kendall_tau_similarity, mean_distance
 
 few_levels = arrays(np.float64, st.tuples(st.integers(2, 12), st.integers(1, 3)), elements=st.integers(-3, 3))
 
@@ -70,6 +70,16 @@ def test_sequences_of_other_shapes_are_refused():
         kendall_tau_similarity(np.zeros((4, 2)), np.zeros((4, 3)))
     with pytest.raises(ValueError, match="finite"):
         kendall_tau_similarity(np.full((4, 2), np.nan), np.zeros((4, 2)))
+
+
+def test_mean_distance_is_that_of_the_frames():
+    target = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    assert mean_distance(target + [[3, 4], [0, 0], [0, 1]], target) == pytest.approx((5 + 0 + 1) / 3)
+    assert mean_distance(target, target) == 0
+    with pytest.raises(ValueError, match="2 frames and target 3; warp one"):
+        mean_distance(target[:2], target)
+    with pytest.raises(ValueError, match="finite"):
+        mean_distance(target * np.nan, target)
 
 
 def test_a_quarter_turn_lays_the_joint_over():

@@ -12,10 +12,10 @@ from motionary.pipeline.canonical import (
     canonical_indices,
     find_convention,
 )
-from motionary.pipeline.joint_rotations import FP_JOINTS, joint_rotations
+from motionary.pipeline.joint_rotations import FP_JOINTS, bone_directions, joint_rotations
 from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.readers import read_motion
-from motionary.pipeline.synthetic import template
+from motionary.pipeline.synthetic import CONVENTIONS, DEFAULT_BODY, template
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +106,72 @@ def test_every_real_clip_with_rotations_reads(shared_data):
         rotations = joint_rotations(read_motion(clip), rate=60.0)
         assert rotations.shape[1:] == (8, 4)
         assert np.isfinite(rotations).all()
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_bones_point_where_the_next_joint_lies(convention):
+    skeleton = CONVENTIONS[convention].skeleton(DEFAULT_BODY)
+    directions = bone_directions(skeleton)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
+    down = directions[[FP_JOINTS.index("left_knee"), FP_JOINTS.index("right_hip")]] @ (0, -1, 0)
+    assert (down > 0.9).all()
+    sideways = directions[:, 0]
+    assert sideways[FP_JOINTS.index("left_elbow")] > 0.99
+    assert sideways[FP_JOINTS.index("right_shoulder")] < -0.99
+
+
+def test_joint_trajectories_are_the_limbs_of_a_performance():
+    """Turned by its joint and all above it, a bone's direction is the limb's in the world."""
+    motion = template("kick")
+    own = canonical_indices(motion.skeleton, find_convention(motion.skeleton.names))
+    place = dict(zip(CANONICAL_JOINTS, own, strict=True))
+    knee, ankle = place["left_knee"], place["left_ankle"]
+    thigh = motion.skeleton.parents[knee]
+    world = Rotation.identity(motion.frames)
+    for joint in reversed(_above(motion.skeleton.parents, thigh)):
+        world = world * Rotation.from_quat(motion.rotations[:, joint])
+    shank = Rotation.from_quat(motion.rotations[:, knee]).apply(
+        bone_directions(motion.skeleton)[FP_JOINTS.index("left_knee")]
+    )
+    positions = motion.positions()
+    shown = positions[:, ankle] - positions[:, knee]
+    expected = shown / np.linalg.norm(shown, axis=1, keepdims=True)
+    np.testing.assert_allclose(world.apply(shank), expected, atol=1e-9)
+
+
+def _above(parents, joint):
+    chain = [joint]
+    while parents[chain[-1]] != -1:
+        chain.append(parents[chain[-1]])
+    return chain
+
+
+def test_a_bone_of_no_length_is_refused():
+    skeleton = CONVENTIONS["mixamo"].skeleton(DEFAULT_BODY)
+    own = dict(
+        zip(CANONICAL_JOINTS, canonical_indices(skeleton, find_convention(skeleton.names)), strict=True)
+    )
+    offsets = skeleton.offsets.copy()
+    offsets[own["left_ankle"]] = 0
+    with pytest.raises(ValueError, match="that begins at '.*LeftLeg' has length 0"):
+        bone_directions(replace(skeleton, offsets=offsets))
+
+
+def test_a_limb_may_have_a_joint_between():
+    skeleton = CONVENTIONS["mixamo"].skeleton(DEFAULT_BODY)
+    own = dict(
+        zip(CANONICAL_JOINTS, canonical_indices(skeleton, find_convention(skeleton.names)), strict=True)
+    )
+    at, knee = own["left_ankle"], own["left_knee"]
+    assert skeleton.parents[at] == knee
+    parents = [parent + (parent >= at) for parent in skeleton.parents]
+    parents[at] = at  # hangs from the new joint, which takes its place
+    twisted = Skeleton(
+        (*skeleton.names[:at], "twist", *skeleton.names[at:]),
+        (*parents[:at], int(knee), *parents[at:]),
+        np.insert(skeleton.offsets, at, [7.0, 0, 0], axis=0),
+    )
+    shank = skeleton.offsets[at] + [7.0, 0, 0]
+    found = bone_directions(twisted)
+    np.testing.assert_allclose(found[FP_JOINTS.index("left_knee")], shank / np.linalg.norm(shank))
+    np.testing.assert_allclose(found[FP_JOINTS.index("right_knee")], bone_directions(skeleton)[3])

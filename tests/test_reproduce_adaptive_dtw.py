@@ -17,6 +17,7 @@ from motionary.workflows.reproduce.adaptive_dtw import (
     AdaptiveExperiment,
     Library,
     comparable_pairs,
+    pairs_to_join,
     study_adaptive_dtw,
 )
 from motionary.workflows.reproduce.adaptive_dtw_measures import (
@@ -85,6 +86,60 @@ def test_only_clips_of_the_same_joints_are_paired():
     assert comparable_pairs(library, 1, 0)["a"] == pairs["a"][:1]
 
 
+def test_a_person_with_a_rig_of_their_own_is_compared_with_themselves():
+    ids = [f"{action}{who}{take}" for action in "ab" for who in "pq" for take in "12"]
+    classes, who = (np.array([one[place] for one in ids], dtype=object) for place in (0, 1))
+    joints = {one: (one[1], "y") for one in ids}
+    pairs = comparable_pairs(Library(LabelledClips(ids, classes, who), joints, None, 30.0, ()), 9, 0)
+    assert {name: sorted(of) for name, of in pairs.items()} == {
+        action: [
+            (f"{action}{one}", f"{action}{other}")
+            for one, other in (("p1", "p2"), ("p2", "p1"), ("q1", "q2"), ("q2", "q1"))
+        ]
+        for action in "ab"
+    }
+
+
+def test_pairs_of_two_people_come_first():
+    ids = [f"a{who}{take}" for who in "pq" for take in "123"]
+    who = np.array([one[1] for one in ids], dtype=object)
+    clips = LabelledClips(ids, np.array(["a"] * 6, dtype=object), who)
+    library = Library(clips, dict.fromkeys(ids, ("x",)), None, 30.0, ())
+    (every,) = comparable_pairs(library, 99, 3).values()
+    assert len(set(every)) == len(every) == 30
+    assert [one[1] == other[1] for one, other in every] == [False] * 18 + [True] * 12
+    (some,) = comparable_pairs(library, 20, 3).values()
+    assert some == every[:20]
+    assert comparable_pairs(library, 20, 4)["a"] != some
+
+
+def test_six_actions_are_drawn_of_those_that_can_be_compared():
+    ids = [f"{action}{take}" for action in "abcdefghijkl" for take in "12"]
+    clips = LabelledClips(ids, np.array([one[0] for one in ids], dtype=object), None)
+    joints = {one: ("x",) if one[0] in "aceghikl" or one[1] == "1" else ("z",) for one in ids}
+    drawn = [set(comparable_pairs(Library(clips, joints, None, 30.0, ()), 1, seed)) for seed in range(9)]
+    assert all(len(one) == 6 for one in drawn)
+    assert set.union(*drawn) == set("aceghikl")
+
+
+def test_pairs_are_joined_rig_by_rig():
+    joints = {f"{rig}{k}": (rig,) for rig in "xy" for k in range(9)}
+    library = Library(None, joints, None, 30.0, ())
+    x, y = ([(f"{rig}{k}", f"{rig}{k + 1}") for k in range(4)] for rig in "xy")
+    pairs = {"a": [x[0], y[0], x[1]], "b": [y[1], x[2]], "c": [x[3]]}
+    assert pairs_to_join(library, pairs) == [[x[0], x[2], x[3]], [y[0], y[1]]]
+
+
+def test_an_error_of_any_other_method_is_not_passed_over():
+    def broken(moving, reference):
+        raise ValueError("what is wrong")
+
+    motion = synthetic_library()[0].motion
+    with pytest.raises(ValueError, match="what is wrong"):
+        measure_pair(TAKES, "a", ("m", "r"), motion, motion, 30.0, methods={ADAPTIVE: broken})
+    assert measure_pair(TAKES, "a", ("m", "r"), motion, motion, 30.0, methods={LIMITED: broken}) == []
+
+
 def test_the_experiment_has_every_part(conducted):
     study = conducted.study
     rows = study.to_arrow().to_pandas()
@@ -116,8 +171,9 @@ def test_the_report_sets_ours_beside_what_the_paper_says(conducted):
     Console(file=shown, width=200).print(adaptive_dtw_report(conducted))
     text = shown.getvalue()
     assert all(len(line) <= 200 for line in text.splitlines())
-    for words in (*PAPER.values(), "Known warps", "radius 3, K 5", "prints no numbers", "seed 0"):
+    for words in (*PAPER.values(), "Known warps", "radius 3, K 5", "prints\nno numbers", "seed 0"):
         assert words in text
+    assert "Pairs of takes: 2, of 2 of 2 actions; of sequences of takes joined: 1." in text
     stay = conducted.study.of(TAKES, "stay")[ADAPTIVE].mean()
     (line, *_) = [line for line in text.splitlines() if line.startswith(ADAPTIVE)]
     assert f" {stay:.1f} " in line
@@ -136,6 +192,24 @@ def test_claims_are_judged_by_the_numbers():
     assert judged(4, 4, 4) == [True] * 4
     assert judged(6, 4, 4) == [False, True, True, True]
     assert judged(4, 6, 6) == [True, False, False, False]
+
+
+def test_claims_compare_what_both_methods_align_and_print_it():
+    """Where LIMITED finds no path, adaptive DTW lies far away; that must not count against it."""
+    away = {"r1": {ADAPTIVE: 2.0, LIMITED: 3.0, CONSTRAINED: 8.5}, "r2": {ADAPTIVE: 9.0, CONSTRAINED: 6.5}}
+    rows = [
+        Measurement(SEQUENCES, "several", "m", reference, name, measure, values.get(name, 1.0))
+        for reference, values in away.items()
+        for name in ("DTW", *values)
+        for measure in ("stay", "jerk", "deviation")
+    ]
+    *_, limited, constrained = claims(Measurements(rows))
+    assert limited.startswith("On 1 of 2 sequences ")
+    assert limited.endswith("than constrained DTW, 2 steps: holds, 2.00 against 3.00 on average.")
+    assert constrained.startswith("On 2 sequences ")
+    assert constrained.endswith("than constrained DTW, K 2: holds, 5.50 against 7.50 on average.")
+    without = [row for row in rows if row.method != LIMITED]
+    assert "constrained DTW, 2 steps aligns none" in claims(Measurements(without))[2]
 
 
 def test_a_catalog_of_other_rigs_is_refused_and_one_of_the_same_read(

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,22 +20,21 @@ import pyarrow as pa
 from motionary.catalog import Catalog
 from motionary.catalog.example import example_of
 from motionary.catalog.views.aligned_pair import AlignedPair, Take
-from motionary.catalog.views.alignment_chart import Way
+from motionary.catalog.views.alignment_lines import MOST_SHOWN
 from motionary.catalog.views.alignment_page import alignment_page
-from motionary.pipeline.alignment import Warp, dtw, mean_correlation, roughness
-from motionary.pipeline.alignment.postures import linearised_postures, posture_weights
+from motionary.catalog.views.alignment_ways import Way
+from motionary.pipeline.alignment import Warp, dtw
+from motionary.pipeline.alignment.postures import weighted_postures
 from motionary.pipeline.alignment.registry import ALIGNERS, Aligner
 from motionary.pipeline.config import FeatureConfig
-from motionary.pipeline.evaluation import longest_stay, path_deviation
+from motionary.pipeline.evaluation import alignment_scores
 from motionary.pipeline.features import POSE_COLUMNS, frame_features
-from motionary.pipeline.joint_rotations import joint_rotations
+from motionary.pipeline.joint_rotations import joint_rotations, refuse_other_joints
 from motionary.pipeline.motion import FloatArray
 from motionary.pipeline.readers import read_motion
 from motionary.pipeline.tables import table_field
 from motionary.pipeline.writers import whole_file
 from motionary.workflows.errors import UserError
-
-_LEAST_ROUGH = 3  # frames that a trajectory needs to turn
 
 SCORES = pa.schema(
     [
@@ -51,6 +51,9 @@ SCORES = pa.schema(
         ),
         table_field("from_dtw", pa.float64(), "the mean distance in time from the warp of DTW", "s"),
         table_field("longest_still", pa.float64(), "the longest that the warp holds a single frame", "s"),
+        table_field(
+            "longest_leap", pa.float64(), "the most of it that passes from one frame to the next", "s"
+        ),
         table_field(
             "roughness",
             pa.float64(),
@@ -133,7 +136,7 @@ def align_pair(pair: AlignedPair, methods: Sequence[str], *, lenient: bool = Fal
     """
     plain = dtw(pair.moving.pose, pair.reference.pose)
     warps: dict[str, Warp] = {}
-    rows: list[dict[str, str | float | None]] = []
+    rows: list[dict[str, Any]] = []
     refused: dict[str, str] = {}
     for aligner in (ALIGNERS[name] for name in dict.fromkeys(["uniform", *methods])):
         try:
@@ -148,16 +151,25 @@ def align_pair(pair: AlignedPair, methods: Sequence[str], *, lenient: bool = Fal
             continue
         seconds = perf_counter() - started
         rows.append(
-            {"method": aligner.name, "title": aligner.title, "seconds": seconds, **_scores(pair, warp, plain)}
+            {
+                "method": aligner.name,
+                "title": aligner.title,
+                **asdict(alignment_scores(pair.moving.pose, pair.reference.pose, warp, plain, pair.rate)),
+                "seconds": seconds,
+            }
         )
         if aligner.name != "uniform":
             warps[aligner.title] = warp
+    if len(warps) > MOST_SHOWN:  # not all are shown at once: first those that bring the two nearest
+        correlation = {row["title"]: row["correlation"] or 0.0 for row in rows}
+        warps = dict(sorted(warps.items(), key=lambda one: -correlation[one[0]]))
     return Alignment(replace(pair, warps=warps), pa.Table.from_pylist(rows, schema=SCORES), refused)
 
 
 def write_alignment_page(alignment: Alignment, file: Path, ways: Sequence[Way] | None = None) -> int:
     """Write the page of an alignment, whole or not at all; return its length in bytes."""
-    content = alignment_page(alignment.pair, alignment.scores, ways).encode("utf-8", "replace")
+    text = alignment_page(alignment.pair, alignment.scores, alignment.refused, ways)
+    content = text.encode("utf-8", "replace")
     with whole_file(file) as temporary, temporary.open("wb") as stream:
         stream.write(content)
         stream.flush()
@@ -193,12 +205,11 @@ def _read_by(aligner: Aligner, pair: AlignedPair) -> tuple[FloatArray, FloatArra
     """Return both as a method reads them, at the pair's rate."""
     moving, reference = pair.moving.motion, pair.reference.motion
     if aligner.reads == "rotations":
+        refuse_other_joints(moving, reference)
         turned = partial(joint_rotations, rate=pair.rate, conventions=pair.conventions)
         return turned(moving), turned(reference)
     if aligner.reads == "postures":
-        scale = np.sqrt(posture_weights(reference.skeleton, pair.conventions))
-        first, second = linearised_postures(moving, reference, pair.rate)
-        return first * scale, second * scale
+        return weighted_postures(moving, reference, pair.rate, pair.conventions)
     return pair.moving.pose, pair.reference.pose
 
 
@@ -207,18 +218,3 @@ def _load_kernels(aligner: Aligner, like: FloatArray) -> None:
     values = np.random.default_rng(0).standard_normal((8, *like.shape[1:]))
     values /= np.linalg.norm(values, axis=-1, keepdims=True)  # quaternions are such
     aligner.align(values.astype(like.dtype), values[::-1].astype(like.dtype))
-
-
-def _scores(pair: AlignedPair, warp: Warp, plain: Warp) -> dict[str, float | None]:
-    reference = pair.reference.pose
-    warped = warp.apply(pair.moving.pose)
-    moves = (np.ptp(pair.moving.pose, axis=0) > 0) | (np.ptp(reference, axis=0) > 0)
-    steps = np.stack([warp.source_time.round(6), np.arange(len(reference))], axis=1)
-    rough = len(reference) >= _LEAST_ROUGH
-    return {
-        "correlation": mean_correlation(warped, reference, moves.astype(float)) if moves.any() else None,
-        "distance": float(np.linalg.norm(warped - reference, axis=1).mean()),
-        "from_dtw": path_deviation(warp.source_time, plain.source_time) / pair.rate,
-        "longest_still": longest_stay(steps) / pair.rate,
-        "roughness": roughness(warped) if rough else None,
-    }

@@ -5,7 +5,7 @@ It needs nothing from outside itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -13,7 +13,9 @@ import numpy as np
 import pyarrow as pa
 
 from motionary.catalog.views.aligned_pair import AlignedPair
-from motionary.catalog.views.alignment_chart import MOST_SHOWN, Way, liveliest_ways, warps_figure, ways_figure
+from motionary.catalog.views.alignment_chart import warps_figure
+from motionary.catalog.views.alignment_lines import MOST_SHOWN
+from motionary.catalog.views.alignment_ways import Way, liveliest_ways, ways_figure
 from motionary.catalog.views.charts import chart_html, plotly_script
 from motionary.catalog.views.figure_body import by_joint, canonical_body, joints_between
 from motionary.catalog.views.figure_data import Figure
@@ -28,7 +30,9 @@ _REFERENCE = "reference"
 _STYLE = ".keys { overflow-x: auto; } .keys .wide { overflow: visible; }"
 
 
-def alignment_page(pair: AlignedPair, scores: pa.Table, ways: Sequence[Way] | None = None) -> str:
+def alignment_page(
+    pair: AlignedPair, scores: pa.Table, refused: Mapping[str, str], ways: Sequence[Way] | None = None
+) -> str:
     """Show an alignment on one HTML page.
 
     Parameters
@@ -36,6 +40,8 @@ def alignment_page(pair: AlignedPair, scores: pa.Table, ways: Sequence[Way] | No
     pair : AlignedPair
     scores : pyarrow.Table
         A row a method; fields tell their meaning and unit, see `motionary.pipeline.tables.table_field`.
+    refused : mapping of str to str
+        Methods that could not align the two, and why.
     ways : sequence of Way, optional
         The joints and directions that are drawn; those that move most where left out.
 
@@ -45,10 +51,10 @@ def alignment_page(pair: AlignedPair, scores: pa.Table, ways: Sequence[Way] | No
         HTML with everything it needs inside, Plotly's script included.
     """
     return page(
-        f"{pair.moving.name} in the time of {pair.reference.name}",
+        " in the time of ".join(pair.short_names),
         [
             _heading(pair),
-            _scores_section(scores),
+            _scores_section(scores, refused),
             _player_section(pair),
             _warps_section(pair),
             _ways_section(pair, ways),
@@ -66,11 +72,11 @@ def _heading(pair: AlignedPair) -> str:
             ("frames a second", f"{pair.rate:g}"),
         ]
     )
-    names = [isolated(take.name).text for take in (pair.moving, pair.reference)]
+    names = [isolated(name).text for name in pair.short_names]
     return f'<h1>{names[0]}</h1>\n<p class="quiet">in the time of {names[1]}, the reference</p>\n{figures}'
 
 
-def _scores_section(scores: pa.Table) -> str:
+def _scores_section(scores: pa.Table, refused: Mapping[str, str]) -> str:
     columns: list[str] = []
     meanings: list[list[Cell]] = []
     for field in scores.schema:
@@ -86,6 +92,9 @@ def _scores_section(scores: pa.Table) -> str:
         "say at what cost. The first row is the motion only stretched to the reference's length.",
         f'<div class="keys" tabindex="0" role="region" aria-label="Scores">{table(columns, rows)}</div>',
         details("What the columns are", table(["column", "is"], meanings)),
+        details(f"Left out: {len(refused)}", table(["method", "since"], [[*one] for one in refused.items()]))
+        if refused
+        else "",
         name="scores",
     )
 
@@ -93,7 +102,8 @@ def _scores_section(scores: pa.Table) -> str:
 def _player_section(pair: AlignedPair) -> str:
     shown = dict(islice(pair.shown.items(), MOST_SHOWN))
     figures = [_reference_figure(pair), *(_moving_figure(pair, name, warp) for name, warp in shown.items())]
-    left_out = "" if len(shown) == len(pair.shown) else f" Only the first {MOST_SHOWN} methods play here."
+    every = len(shown) == len(pair.shown)
+    left_out = "" if every else f" Only the {MOST_SHOWN} of greatest correlation play here."
     return section(
         "Playing",
         "The reference, then the other as each method shows it in the reference's time. Without Aligned each "

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
-from motionary.pipeline.alignment.warp import checked_pair
+from motionary.pipeline.alignment.warp import at_a_clear_size, checked_pair
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.alignment.windows import Limits
 from motionary.pipeline.motion import FloatArray
@@ -60,7 +60,7 @@ def adaptive_dtw(
     radius : int
         Frames by which the path of a coarser level is widened, 0 or more.
     slope_weight : float
-        K at the finest level, 1 or more.
+        K at the finest level, from 1 to 2^256.
 
     Returns
     -------
@@ -75,17 +75,16 @@ def adaptive_dtw(
     """
     from motionary.pipeline.alignment.banded import banded_path
 
-    if radius < 0:
+    if radius < 0 or radius != int(radius):
         raise ValueError(f"radius is {radius}; it is a number of frames, 0 or more")
-    if not 1 <= slope_weight < np.inf:
-        raise ValueError(f"slope_weight is {slope_weight}; it multiplies what straight steps cost, 1 or more")
     levels = [eigenposture_coordinates(moving, reference, weights, components)]
     while min(map(len, levels[-1])) > radius + 2:
         levels.append((_halved(levels[-1][0]), _halved(levels[-1][1])))
     limits = _all_columns(*map(len, levels[-1]))
     for level in range(len(levels) - 1, -1, -1):
         one, other = levels[level]
-        path = banded_path(one, other, *limits, max(1.0, slope_weight - level))
+        # At the finest level K is as it was given, so that `banded_path` refuses what is out of its range.
+        path = banded_path(one, other, *limits, max(1.0, slope_weight - level) if level else slope_weight)
         if level:
             limits = _widened(path, radius, *map(len, levels[level - 1]))
     return path_warp(path, len(levels[0][0]))
@@ -105,7 +104,7 @@ def constrained_dtw(
     moving, reference, weights, components
         As of `adaptive_dtw`.
     slope_weight : float
-        K, 1 or more; at 1 it is DTW.
+        K, from 1 to 2^256; at 1 it is DTW.
 
     Returns
     -------
@@ -149,9 +148,10 @@ def eigenposture_coordinates(
         Shapes disagree, a value is not finite, or `components` is under 1.
     """
     moving, reference = checked_pair(moving, reference)
-    if components < 1:
-        raise ValueError(f"components is {components}; at least one principal posture must count")
+    if components < 1 or components != int(components):
+        raise ValueError(f"components is {components}; it is a number of principal postures, 1 or more")
     rounding = np.finfo(reference.dtype).eps if reference.dtype.kind == "f" else np.finfo(np.float64).eps
+    (moving, reference), _ = at_a_clear_size(moving.astype(np.float64), reference.astype(np.float64))
     scale = np.sqrt(checked_weights(weights, reference.shape[1]))
     mean = reference.mean(axis=0, dtype=np.float64)
     centred = (reference - mean) * scale

@@ -36,7 +36,7 @@ def banded_path(
     first, last : array (m,) of int
         The columns that each row may visit, inclusive. Time and memory go with their number.
     slope_weight : float
-        K, 1 or more, at most 2^256.
+        K, from 1 to 2^256.
 
     Returns
     -------

@@ -8,31 +8,31 @@ they correlate (canonical correlation analysis, `multiset_cca.py`), and joined t
 
 Both steps take turns until a path repeats. A path never costs more than the one before it at the same
 projections (`CanonicalWarp.costs`), but the constraint on the projections holds the path as well, so the
-alternation need not descend: the path of least cost is kept.
+alternation need not descend. The path of least cost a dimension is kept: rounds may keep other numbers of
+dimensions, and the constraint gives each the same weight.
 
 - The start decides much. Where both have the same number of DOFs it is the nearest path of both, each
   centred (V = I), which takes DOF j of one to be DOF j of the other; else, with nothing to compare, a uniform
-  path, as [GTW] begins. From that, real takes come out little better than uniform; from the nearest one, DOFs
-  that mean different things are misled: `start` chooses.
+  path, as [GTW] begins. A uniform path is a local minimum for many takes, and the nearest one is no guide
+  where DOFs mean different things: `start` chooses.
 - Projections are regularised (lambda of eq. 7, in units of each sequence's own variance). A take has hardly
   more frames than DOFs, and at 0 some projection agrees perfectly along any path, which so repeats at once;
-  near 1 only the largest movement counts, and paths stand still for long. Between, real takes come out alike;
-  where there are few DOFs, little regularisation sees through more.
+  near 1 only the largest movement counts. Where there are few DOFs, little regularisation sees through more.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionary.pipeline.alignment.iterative import nearest_path
+from motionary.pipeline.alignment.dtw import nearest_path
 from motionary.pipeline.alignment.multiset_cca import Embedding, multiset_cca
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
 from motionary.pipeline.alignment.uniform import uniform_times
-from motionary.pipeline.alignment.warp import checked_sequence
+from motionary.pipeline.alignment.warp import at_a_clear_size, checked_sequence
 from motionary.pipeline.motion import FloatArray
 
 
@@ -88,14 +88,17 @@ def canonical_time_warping(
     Raises
     ------
     ValueError
-        A sequence is not (frames, dofs) or holds a value that is not finite, a setting is out of range, or
-        the sequences are too long (n + m above 2^19).
+        A sequence is not (frames, dofs) or holds a value that is not finite, a setting is out of range, the
+        sequences are too long (n + m above 2^19), or one so small that its projection is beyond 64 bits.
     """
     moving = checked_sequence(moving, "moving").astype(np.float64)
     reference = checked_sequence(reference, "reference").astype(np.float64)
     if most_rounds < 1:
         raise ValueError(f"most_rounds is {most_rounds}; it takes one round at least")
     path = _first_path(moving, reference, start)
+    # Each by itself: their proportion counts in the first path alone.
+    (moving,), own = at_a_clear_size(moving)
+    (reference,), others = at_a_clear_size(reference)
     least, best, space = np.inf, path, _no_space(moving, reference)
     costs: list[tuple[float, float]] = []
     # What stands still throughout correlates with nothing: the first path is as good as any.
@@ -107,12 +110,27 @@ def canonical_time_warping(
         one, other = embedding.project([moving, reference])
         before, path = path, nearest_path(one, other)
         costs.append((_cost(one, other, before), _cost(one, other, path)))
-        if costs[-1][1] < least:
-            least, best, space = costs[-1][1], path, embedding
+        of_a_dimension = costs[-1][1] / one.shape[1]
+        if of_a_dimension < least:
+            least, best, space = of_a_dimension, path, embedding
     warp = path_warp(best, len(moving))
+    space = _in_their_units(space, own, others)
     return CanonicalWarp(
         warp.source_time, warp.moving_frames, warp.path, space, np.array(costs).reshape(-1, 2)
     )
+
+
+def _in_their_units(space: Embedding, *exponents: int) -> Embedding:
+    """Return projections and means for sequences as they were given."""
+    both = list(zip(space.projections, space.means, exponents, strict=True))
+    with np.errstate(over="ignore"):
+        projections = tuple(np.ldexp(projection, exponent) for projection, _, exponent in both)
+    if not all(np.isfinite(projection).all() for projection in projections):
+        raise ValueError(
+            "a sequence's values are so small that its projection is beyond 64 bits; use a smaller unit"
+        )
+    means = tuple(np.ldexp(mean, -exponent) for _, mean, exponent in both)
+    return replace(space, projections=projections, means=means)
 
 
 def _no_space(*sequences: FloatArray) -> Embedding:

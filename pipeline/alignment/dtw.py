@@ -15,11 +15,12 @@ them, a single frame 0: the paper says nothing of sequences that short. The riva
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
-from motionary.pipeline.alignment.warp import checked_pair, checked_sequence
+from motionary.pipeline.alignment.warp import at_a_clear_size, checked_pair, checked_sequence
 from motionary.pipeline.alignment.weights import checked_weights
-from motionary.pipeline.alignment.windows import Window
+from motionary.pipeline.alignment.windows import Window, check_window
 from motionary.pipeline.motion import FloatArray
 
 
@@ -54,13 +55,18 @@ def dtw(
     ValueError
         Shapes disagree, a value is not finite, the window leaves no path, or the sequences are too long
         (n + m above 2^19).
+    TypeError
+        The window is none.
     """
     from motionary.pipeline.distances import cost_matrix, dtw_path
 
+    check_window(window)
     moving, reference = checked_pair(moving, reference)
     if weights is not None:
         scale = np.sqrt(checked_weights(weights, reference.shape[1]))
         moving, reference = moving * scale, reference * scale
+    # Distances are roots of sums of squares, which are 0 of what is below 1e-162.
+    (moving, reference), _ = at_a_clear_size(moving, reference)
     if window is None:
         path = dtw_path(cost_matrix(moving, reference))
     else:
@@ -98,8 +104,32 @@ def derivative_dtw(
     ValueError
         As `dtw`.
     """
-    moving, reference = checked_pair(moving, reference)
+    (moving, reference), _ = at_a_clear_size(*checked_pair(moving, reference))
     return dtw(derivatives(moving), derivatives(reference), weights, window)
+
+
+def nearest_path(moving: FloatArray, reference: FloatArray) -> NDArray[np.int64]:
+    """Find the path of the least sum of *squared* distances [GTW eq. 1], which other methods alternate with.
+
+    Parameters
+    ----------
+    moving : array (n, dofs)
+    reference : array (m, dofs)
+
+    Returns
+    -------
+    array (L, 2) of int
+        As `motionary.pipeline.distances.dtw_path`.
+
+    Raises
+    ------
+    ValueError
+        As `dtw`.
+    """
+    from motionary.pipeline.distances import cost_matrix, dtw_path
+
+    (moving, reference), _ = at_a_clear_size(*checked_pair(moving, reference))
+    return dtw_path(cost_matrix(moving, reference) ** 2)
 
 
 def derivatives(values: FloatArray) -> FloatArray:

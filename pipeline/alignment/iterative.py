@@ -7,8 +7,8 @@ turn, each the best for the other:
     least  sum over the path of |a_i * x_i + b_i - y_k|^2  +  lambda_a |differences of a|^2
                                                            +  lambda_b |differences of b|^2
 
-Neither step raises that sum, which `IterativeWarp.energies` shows, and it ends when the path repeats. The
-first path is that of a = 1, b = 0.
+Neither step raises that sum, which `IterativeWarp.energies` shows. It ends when the path repeats, or where a
+step gains less than rounding loses. The first path is that of a = 1, b = 0.
 
 So that offset and unit of either sequence change nothing, each is centred by DOF and divided by its root mean
 square over all DOFs first, and the smoothness weighs changes in those units. The rival, the sequences as they
@@ -23,9 +23,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from motionary.pipeline.alignment.dtw import nearest_path
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
 from motionary.pipeline.alignment.scale_and_offset import checked_smoothness, fit_scale_and_offset
-from motionary.pipeline.alignment.warp import checked_pair
+from motionary.pipeline.alignment.warp import at_a_clear_size, checked_pair
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
@@ -50,11 +51,12 @@ class IterativeWarp(PathWarp):
 
 @dataclass(frozen=True, eq=False)
 class _Standard:
-    """A sequence centred by DOF and in units of its own root mean square."""
+    """A sequence centred by DOF and in units of its own root mean square, unit / 2^exponent."""
 
     values: FloatArray
     mean: FloatArray
     unit: float
+    exponent: int
 
 
 def iterative_motion_warping(
@@ -74,7 +76,8 @@ def iterative_motion_warping(
     reference : array (m, dofs)
         The sequence whose timing it takes.
     weights : array (dofs,), optional
-        Of the squared differences, not negative; 1 each by default.
+        Of the squared differences, and of the smoothness of a DOF's scale and offset alike, not negative; 1
+        each by default.
     scale_smoothness, offset_smoothness : float
         lambda_a and lambda_b. Scales and offsets follow what lasts longer than about their square root in
         frames; the larger, the nearer to one scale and offset for the whole of a DOF.
@@ -89,10 +92,10 @@ def iterative_motion_warping(
     Raises
     ------
     ValueError
-        Shapes disagree, a value is not finite, a smoothness is negative, or the sequences are too long
-        (n + m above 2^19).
+        Shapes disagree, a value is not finite, a smoothness is negative, the sequences are too long
+        (n + m above 2^19), or moving ones so small beside their reference that a scale is beyond 64 bits.
     """
-    moving, reference = checked_pair(moving, reference)
+    moving, reference = (values.astype(np.float64) for values in checked_pair(moving, reference))
     root = np.sqrt(checked_weights(weights, moving.shape[1]))
     smoothness = checked_smoothness(scale_smoothness, offset_smoothness)
     if most_rounds < 1:
@@ -103,30 +106,43 @@ def iterative_motion_warping(
     path = nearest_path(own.values * root, other.values * root)
     energies = [_energy(own, other, path, scale, offset, root, smoothness)]
     for _ in range(most_rounds):
-        scale, offset = fit_scale_and_offset(own.values, path[:, 0], other.values[path[:, 1]], *smoothness)
-        energies.append(_energy(own, other, path, scale, offset, root, smoothness))
-        before, path = path, nearest_path((scale * own.values + offset) * root, other.values * root)
-        energies.append(_energy(own, other, path, scale, offset, root, smoothness))
+        fitted = fit_scale_and_offset(own.values, path[:, 0], other.values[path[:, 1]], *smoothness)
+        energy = _energy(own, other, path, *fitted, root, smoothness)
+        if energy > energies[-1]:
+            break
+        scale, offset = fitted
+        energies.append(energy)
+        nearest = nearest_path((scale * own.values + offset) * root, other.values * root)
+        energy = _energy(own, other, nearest, scale, offset, root, smoothness)
+        if energy > energies[-1]:
+            break
+        before, path = path, nearest
+        energies.append(energy)
         if np.array_equal(before, path):
             break
     warp = path_warp(path, len(moving))
-    scale = scale * (other.unit / own.unit)
-    offset = offset * other.unit + other.mean - scale * own.mean
+    scale, offset = _in_their_units(own, other, scale, offset)
     return IterativeWarp(warp.source_time, warp.moving_frames, warp.path, scale, offset, np.array(energies))
 
 
-def nearest_path(moving: FloatArray, reference: FloatArray) -> NDArray[np.int64]:
-    """Return the path (L, 2) of the least sum of squared distances [GTW eq. 1]."""
-    from motionary.pipeline.distances import cost_matrix, dtw_path
-
-    return dtw_path(cost_matrix(moving, reference) ** 2)
-
-
 def _standard(values: FloatArray) -> _Standard:
-    mean = values.mean(axis=0, dtype=np.float64)
-    centred = np.where(np.ptp(values, axis=0) == 0, 0.0, values - mean)
+    mean = values.mean(axis=0)
+    (centred,), exponent = at_a_clear_size(np.where(np.ptp(values, axis=0) == 0, 0.0, values - mean))
     unit = float(np.sqrt((centred**2).mean())) or 1.0
-    return _Standard(centred / unit, mean, unit)
+    return _Standard(centred / unit, mean, unit, exponent)
+
+
+def _in_their_units(
+    own: _Standard, other: _Standard, scale: FloatArray, offset: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        scale = np.ldexp(scale * (other.unit / own.unit), own.exponent - other.exponent)
+        offset = np.ldexp(offset * other.unit, -other.exponent) + other.mean - scale * own.mean
+    if not (np.isfinite(scale).all() and np.isfinite(offset).all()):
+        raise ValueError(
+            "moving is so small beside reference that its scale is beyond 64 bits; bring both to a like unit"
+        )
+    return scale, offset
 
 
 def _energy(

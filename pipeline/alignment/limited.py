@@ -11,10 +11,16 @@ import numpy as np
 
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
 from motionary.pipeline.alignment.warp import checked_pair
+from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
+MOST_WAYS = 1 << 30
+"""Ways to come to cells that are kept, a byte each: with 2 steps those of two clips of 14,600 frames."""
 
-def limited_dtw(moving: FloatArray, reference: FloatArray, most: int = 2) -> PathWarp:
+
+def limited_dtw(
+    moving: FloatArray, reference: FloatArray, weights: FloatArray | None = None, most: int = 2
+) -> PathWarp:
     """Warp one sequence along the nearest path that stands still no longer than a few steps.
 
     Parameters
@@ -23,6 +29,8 @@ def limited_dtw(moving: FloatArray, reference: FloatArray, most: int = 2) -> Pat
         The sequence to be warped.
     reference : array (m, dofs)
         The sequence whose timing it takes.
+    weights : array (dofs,), optional
+        Of the squared differences, not negative; 1 each by default.
     most : int
         Steps in a row along one axis that are allowed, 1 to 60.
 
@@ -35,8 +43,8 @@ def limited_dtw(moving: FloatArray, reference: FloatArray, most: int = 2) -> Pat
     Raises
     ------
     ValueError
-        Shapes disagree, a value is not finite, `most` is out of its range, or the lengths differ by more than
-        such a path can make up for.
+        Shapes disagree, a value is not finite, `most` is out of its range, the lengths differ by more than
+        such a path can make up for, or the sequences are too long (n m (2 most + 1) above 2^30).
     """
     from motionary.pipeline.alignment.limited_kernels import limited_path
     from motionary.pipeline.distances import cost_matrix
@@ -45,6 +53,10 @@ def limited_dtw(moving: FloatArray, reference: FloatArray, most: int = 2) -> Pat
     if not 1 <= most <= 60:
         raise ValueError(f"most is {most}; it is a number of steps from 1 to 60")
     n, m = len(moving), len(reference)
+    _refuse_too_long(n, m, most)
+    if weights is not None:
+        scale = np.sqrt(checked_weights(weights, reference.shape[1]))
+        moving, reference = moving * scale, reference * scale
     before = np.zeros((n, m, 2 * most + 1), dtype=np.int8)
     path = np.empty((n + m - 1, 2), dtype=np.int64)
     begin = limited_path(cost_matrix(moving, reference).astype(np.float64), most, before, path)
@@ -54,3 +66,14 @@ def limited_dtw(moving: FloatArray, reference: FloatArray, most: int = 2) -> Pat
             "frames; allow more, or bring them nearer in length first, by `uniform`"
         )
     return path_warp(path[begin:], n)
+
+
+def _refuse_too_long(moving_frames: int, reference_frames: int, most: int) -> None:
+    ways = 2 * most + 1
+    needed = moving_frames * reference_frames * ways
+    if needed > MOST_WAYS:
+        raise ValueError(
+            f"{moving_frames} moving and {reference_frames} reference frames: {needed} ways to come to their "
+            f"cells, {ways} each, and at most {MOST_WAYS} can be kept; resample or cut the clips"
+            f"{', or allow fewer steps' if most > 1 else ''}"
+        )

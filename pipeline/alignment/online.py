@@ -15,13 +15,15 @@ Where the printed algorithms leave room, this is how they are read:
 - A window has w + 1 frames, its end with it, as the loop of Algorithm 1 and the bound "M + w > m" have it
   (the text counts w). With two frames, method A could stay or go on by one and would never catch up.
 - Forecasting gives the live frame, which method C reads its first column as and method B its second, and
-  then w frames, so that C's window is square. The rival counts the live frame among the w. On takes of
-  HDM05, C then skips at every window; as it is here it sticks with 10 and skips with 80, as the paper's does.
+  then w frames, so that C's window is square, as the arrays of Algorithm 3 are declared. The rival counts the
+  live frame among the w, a column less than there are rows. Whether C sticks with 10 and skips with 80 as
+  the paper's does, `motionary reproduce fp-dtw` prints.
 - The first live frame shows frame 0. "n < s maps to n + 1", with s = 2 frames smoothed over, has B and C
   advance by 1 at the next two. A forecasts nothing and has no such start.
 - D(0, 0) = 10,000 means "never": here it is infinite, since many joints over a wide window add up to more.
-- Of equal costs A and C take the advance nearest to 1, and B's path goes aslant, else back along its
-  prerecorded frame. The lowest frame, an argmin's usual choice, would never leave a motion's still beginning.
+- Of equal costs A and C take the advance nearest to 1, and B's path the step that ends nearest to the
+  diagonal, which comes to the same. The lowest frame, an argmin's usual choice, would never leave a motion's
+  still beginning.
 
 Under Type V the three choose the best of what its state allows: A and C among those frames, B among the paths
 that enter the live frame's column in them. A finished motion keeps its last frame, whatever the constraint.
@@ -36,6 +38,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from motionary.pipeline.alignment.forecast import forecast
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
+from motionary.pipeline.alignment.rotation_costs import checked_rotations
 from motionary.pipeline.alignment.type_v import MOST_ADVANCE, TypeV
 from motionary.pipeline.motion import FloatArray
 
@@ -45,6 +48,8 @@ Missing = Literal["forecast", "hold"]
 
 USUAL_WINDOWS = {"A": 2, "B": 40, "C": 40}
 """Frames at 120 a second: the paper's for A, and with which its method C does best."""
+
+MOST_WINDOW = 1000  # a push takes time and memory with its square
 
 _SMOOTHED = 2  # live frames that a forecast is made from
 
@@ -67,13 +72,14 @@ class OnlineAligner:
     Parameters
     ----------
     prerecorded : array (m, J, 4)
-        Unit quaternions x, y, z, w of m frames, as `motionary.pipeline.joint_rotations` gives them; either of
-        a rotation's two quaternions will do.
+        Unit quaternions x, y, z, w of m frames, as `motionary.pipeline.joint_rotations` gives them, of the
+        live motion's rig and at its rate; either of a rotation's two quaternions will do.
     method : {"A", "B", "C"}
         Frame matching, or by forecast: the path through the window, or its accumulated costs.
     window : int, optional
-        Frames that are looked ahead, in both motions; left out 2 with A and 40 with B and C. For C the paper
-        advises less than half the period of what is repeated.
+        Frames that are looked ahead, in both motions, 1 to 1,000; left out 2 with A and 40 with B and C, a
+        third of a second at the paper's 120 frames a second: at 60 give 20. For C the paper advises less than
+        half the period of what is repeated.
     constraint : {"type-v"}, optional
         Advance by at most 3, and stay for at most two live frames in a row.
     missing : {"forecast", "hold"}
@@ -102,10 +108,11 @@ class OnlineAligner:
         if missing not in get_args(Missing):
             raise ValueError(f"missing is {missing!r}; it may be 'forecast' or 'hold'")
         self.method, self.constraint, self.missing = method, constraint, missing
-        self.window = int(USUAL_WINDOWS[method] if window is None else window)
-        if self.window < 1 or (window is not None and self.window != window):
-            raise ValueError(f"window is {window}; it must be a whole number of frames, at least 1")
-        frames = _checked(prerecorded, ("m", "J", 4), "prerecorded")
+        window = USUAL_WINDOWS[method] if window is None else window
+        if not (1 <= window <= MOST_WINDOW and window == int(window)):
+            raise ValueError(f"window is {window}; it must be a whole number of frames, 1 to {MOST_WINDOW}")
+        self.window = int(window)
+        frames = checked_rotations(prerecorded, ("m", "J", 4), "prerecorded")
         self._planes = np.ascontiguousarray(frames.transpose(1, 2, 0))
         self._last, self._joints = len(frames) - 1, frames.shape[1]
         columns = {"A": 1, "B": self.window + 2, "C": self.window + 1}[method]
@@ -142,7 +149,7 @@ class OnlineAligner:
         """
         before = self._followed
         if frame is not None:
-            live = _checked(frame, (self._joints, 4), f"live frame {len(self._path)}")
+            live = checked_rotations(frame, (self._joints, 4), f"live frame {len(self._path)}")
             return self._keep(self._after(before, live))
         if self.missing == "hold" or before.latest is None:
             return self._keep(before._replace(held=before.held + 1))
@@ -217,37 +224,9 @@ def online_warp(
     ValueError
         As `OnlineAligner` and its `push`.
     """
-    prerecorded = _checked(moving, ("m", "J", 4), "moving")
-    live = _checked(reference, ("n", prerecorded.shape[1], 4), "reference")
+    prerecorded = checked_rotations(moving, ("m", "J", 4), "moving")
+    live = checked_rotations(reference, ("n", prerecorded.shape[1], 4), "reference")
     aligner = OnlineAligner(prerecorded, method, window, constraint)
     for frame in live:
         aligner.push(frame)
     return path_warp(np.column_stack([aligner.path, np.arange(len(live))]), len(prerecorded))
-
-
-def _checked(values: ArrayLike, shape: tuple[int | str, ...], name: str) -> NDArray[np.float64]:
-    """Return quaternions in an array of their own, at length 1; a letter in `shape` is any number but 0."""
-    from motionary.pipeline.alignment.online_kernels import normalise
-
-    array = np.asarray(values)
-    fits = array.ndim == len(shape) and all(
-        have == need or (isinstance(need, str) and have)
-        for have, need in zip(array.shape, shape, strict=True)
-    )
-    if not fits or array.dtype.kind not in "fiu":
-        wanted = ", ".join(map(str, shape))
-        raise ValueError(
-            f"{name} has shape {array.shape} and type {array.dtype}; it needs real numbers, ({wanted})"
-        )
-    quaternions = np.ascontiguousarray(array, dtype=np.float64)
-    unit = np.empty_like(quaternions)
-    wrong = normalise(quaternions.reshape(-1, 4), unit.reshape(-1, 4))
-    if wrong >= 0:
-        frame, joint = divmod(wrong, array.shape[-2])
-        place = f"{name}, joint {joint}" if array.ndim == 2 else f"{name}, frame {frame}, joint {joint}"
-        said = ", ".join(f"{one:.6g}" for one in quaternions.reshape(-1, 4)[wrong])
-        raise ValueError(
-            f"{place} holds the quaternion ({said}); it must have length 1 (x, y, z, w): "
-            "normalise it, or push None for a live frame that was lost"
-        )
-    return unit

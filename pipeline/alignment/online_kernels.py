@@ -79,7 +79,7 @@ def match_frame(
     planes: FloatArray, start: int, live: FloatArray, costs: FloatArray, least: int, most: int
 ) -> int:
     """Return the advance, of `least` to `most`, to the frame nearest to the live one [FP Algorithm 1]."""
-    _fill_costs(planes, start, most + 1, live, costs)
+    fill_costs(planes, start, most + 1, live, costs)
     return _cheapest(costs[0], least, most)
 
 
@@ -91,7 +91,7 @@ def plot_path(
 
     Paths may enter that column in rows `least` to `most` alone.
     """
-    _fill_costs(planes, start, rows, live, costs)
+    fill_costs(planes, start, rows, live, costs)
     for row in range(1, rows):
         costs[0, row] += costs[0, row - 1]
     costs[1, 0] = costs[1, 0] + costs[0, 0] if least == 0 else np.inf
@@ -111,9 +111,15 @@ def plot_path(
         slanted, level, upright = costs[column - 1, row - 1], costs[column - 1, row], costs[column, row - 1]
         if column == 1 and row > most:
             slanted, level = np.inf, np.inf
-        if slanted < np.inf and slanted <= level and slanted <= upright:
+        cheapest = min(slanted, level, upright)
+        # Of steps that cost the same the one that ends nearest to the diagonal from the corner.
+        if column > row and level == cheapest:
+            column -= 1
+        elif column < row and upright == cheapest:
+            row -= 1
+        elif slanted == cheapest:
             row, column = row - 1, column - 1
-        elif level <= upright:
+        elif level == cheapest:
             column -= 1
         else:
             row -= 1
@@ -125,7 +131,7 @@ def accumulate_back(
     planes: FloatArray, start: int, rows: int, live: FloatArray, costs: FloatArray, least: int, most: int
 ) -> int:
     """Return the row of least cost in the first column, accumulated from the far corner [FP Algorithm 3]."""
-    _fill_costs(planes, start, rows, live, costs)
+    fill_costs(planes, start, rows, live, costs)
     last = rows - 1
     for row in range(last - 1, -1, -1):
         costs[len(live) - 1, row] += costs[len(live) - 1, row + 1]
@@ -148,7 +154,7 @@ def _cheapest(costs: FloatArray, least: int, most: int) -> int:
 
 
 @_inner_kernel
-def _fill_costs(planes: FloatArray, start: int, rows: int, live: FloatArray, costs: FloatArray) -> None:
+def fill_costs(planes: FloatArray, start: int, rows: int, live: FloatArray, costs: FloatArray) -> None:
     """Fill `costs` (columns, rows) by eq. 1: planes (J, 4, m) of frames from `start`, live (columns, J, 4).
 
     2/pi arccos |p.q| is 4/pi arcsin(c / 2) of the shorter chord c = |p - q| or |p + q|, which loses no digits

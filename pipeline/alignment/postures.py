@@ -27,6 +27,7 @@ from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention, canonical_indices, find_convention
 from motionary.pipeline.features import at_rate
+from motionary.pipeline.joint_rotations import refuse_markers, refuse_other_joints
 from motionary.pipeline.motion import FloatArray, Motion, Skeleton
 
 _MASS = {
@@ -45,6 +46,36 @@ _MASS = {
 
 _LEGS = ("hip", "knee", "ankle")
 _LOWER_BODY_WEIGHT = 0.5
+
+
+def weighted_postures(
+    moving: Motion, reference: Motion, rate: float, conventions: Iterable[Convention] = ()
+) -> tuple[FloatArray, FloatArray]:
+    """Turn two motions into vectors whose squared differences are weighted by limb: what aligners read.
+
+    Parameters
+    ----------
+    moving, reference, rate
+        As of `linearised_postures`.
+    conventions : iterable of Convention
+        A user's own joint names, as of `posture_weights`.
+
+    Returns
+    -------
+    moving, reference : array (frames, 3 J) float64
+        `linearised_postures`, every column times the root of its weight among `posture_weights`. A method
+        that reads them needs no weights besides.
+
+    Raises
+    ------
+    ValueError
+        As `linearised_postures`.
+    UnknownSkeletonError
+        No convention fits the skeleton.
+    """
+    first, second = linearised_postures(moving, reference, rate)
+    scale = np.sqrt(posture_weights(reference.skeleton, conventions))
+    return first * scale, second * scale
 
 
 def linearised_postures(moving: Motion, reference: Motion, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -68,19 +99,9 @@ def linearised_postures(moving: Motion, reference: Motion, rate: float) -> tuple
         A motion has markers and no rotations, or the skeletons differ in their joints.
     """
     for motion in (moving, reference):
-        if motion.places is not None:
-            raise ValueError(
-                f"motion {motion.name!r} has markers and no rotations of joints; "
-                "align it by a method that reads features"
-            )
+        refuse_markers(motion)
+    refuse_other_joints(moving, reference)
     names = reference.skeleton.names
-    if set(moving.skeleton.names) != set(names):
-        strange = sorted(set(moving.skeleton.names) ^ set(names))
-        raise ValueError(
-            f"motions {moving.name!r} and {reference.name!r} have other joints: {', '.join(strange[:6])}"
-            f"{' ...' if len(strange) > 6 else ''} in one alone; "
-            "align them by a method that reads features"
-        )
     order = [moving.skeleton.index(name) for name in names]
     turned = at_rate(moving, rate).rotations[:, order]
     target = at_rate(reference, rate).rotations

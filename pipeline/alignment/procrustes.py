@@ -6,7 +6,7 @@ the minimum of one objective J with the rest held still, they
 
 - for motion warping only, fit every sequence's scales A_i and offsets B_i to the mean, by
   `scale_and_offset.py`;
-- warp every sequence to the mean, by a DTW that is slightly modified;
+- warp every sequence to the mean, by a DTW that is slightly modified, the paper does not say how;
 - take the mean of the warped sequences again.
 
     J = m sum over i of |Y_i W_i - mean|^2 + sum over i of lambda_a |A_i'|^2 + lambda_b |B_i'|^2
@@ -15,9 +15,8 @@ Y_i is X_i (pDTW), its derivatives (pDDTW), or A_i X_i + B_i (pIMW, which alone 
 first differences). The first term is half the squared distance of two warped sequences, summed over all
 ordered pairs. J never rises, and the turns end when the path repeats.
 
-How the DTW is modified the paper does not say. Here the mean goes on at every step, and W_i shows one frame
-there: steps are (1, 1) and (0, 1) alone. A sequence goes on to its next frame or keeps it and skips none,
-which needs l >= n_i. Costs are squared distances, since J is made of them; elsewhere in this package DTW adds
+The DTW shows one frame of W_i at every step of the mean and skips none, which needs l >= n_i, see
+`steps_to_mean.py`. Costs are squared distances, since J is made of them; elsewhere in this package DTW adds
 up distances. pDDTW has a differential operator of first order in the paper, and here the estimate of the
 method it extends, `derivatives`.
 
@@ -37,6 +36,7 @@ from scipy.spatial.distance import cdist
 from motionary.pipeline.alignment.dtw import derivatives
 from motionary.pipeline.alignment.generalized_time import warp_steps
 from motionary.pipeline.alignment.scale_and_offset import checked_smoothness, fit_scale_and_offset
+from motionary.pipeline.alignment.steps_to_mean import one_frame_a_step, uniform_path
 from motionary.pipeline.alignment.warp import Warp, checked_sequence
 from motionary.pipeline.motion import FloatArray
 
@@ -175,55 +175,6 @@ def procrustes_motion_warping(
     found = _warp_to_mean(arrays, steps, reshape)
     scales, offsets = zip(*fitted, strict=True)
     return ProcrustesMotionWarping(found.path, found.mean, found.objectives, scales, offsets)
-
-
-def uniform_path(lengths: Sequence[int], steps: int) -> NDArray[np.int64]:
-    """Return the path on which all sequences run evenly from end to end, where every method here starts.
-
-    Parameters
-    ----------
-    lengths : sequence of int (m,)
-        Frames of the sequences.
-    steps : int
-        l.
-
-    Returns
-    -------
-    array (l, m) int64
-        The nearest frames, halves upwards.
-    """
-    places = np.linspace(0, np.asarray(lengths, dtype=np.float64) - 1, steps)
-    return np.floor(places + 0.5).astype(np.int64)
-
-
-def one_frame_a_step(costs: FloatArray) -> NDArray[np.int64]:
-    """Find the cheapest way through a sequence in which every step shows its last frame or the next one.
-
-    Parameters
-    ----------
-    costs : array (n, l)
-        Of showing frame i at step t; l >= n.
-
-    Returns
-    -------
-    array (l,) int64
-        The frame at every step, from 0 to n - 1, rising by 0 or 1. Of ways that cost the same it is, looking
-        back from the end, the one that is ahead.
-    """
-    frames, steps = costs.shape
-    total = np.full(frames, np.inf)
-    total[0] = costs[0, 0]
-    came = np.zeros((steps, frames), dtype=bool)  # from the frame before
-    for step in range(1, steps):
-        np.less(total[:-1], total[1:], out=came[step, 1:])
-        total[1:] = np.minimum(total[1:], total[:-1])
-        total += costs[:, step]
-    path = np.empty(steps, dtype=np.int64)
-    frame = frames - 1
-    for step in range(steps - 1, -1, -1):
-        path[step] = frame
-        frame -= int(came[step, frame])
-    return path
 
 
 def _warp_to_mean(

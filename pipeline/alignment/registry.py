@@ -43,8 +43,10 @@ class Aligner:
     source : str
         Where it comes from.
     reads : {"features", "postures", "rotations"}
-        What `align` takes: the pose of every frame as (frames, dofs); linearised joint rotations
-        (frames, dofs), of one skeleton; or quaternions (frames, joints, 4).
+        What `align` takes: the pose of every frame as (frames, dofs); joint rotations of one skeleton,
+        linearised and already weighted by limb (frames, 3 joints), as
+        `motionary.pipeline.alignment.postures.weighted_postures` makes them; or quaternions
+        (frames, joints, 4).
     align : callable
         (moving, reference) -> Warp, with as many times as the reference has frames.
     other_dofs : bool

@@ -3,7 +3,8 @@
     maximise over L, delta:  rho - alpha |h|        (eq. 8; see `whole_output`)
 
 over L = 8 .. m / 2 and delta = 1 .. L - 4, and the single segment that does not warp, so that the result's
-correlation is never below length-matching's. Of equal values the shorter segment is taken, then the larger
+correlation is never below length-matching's. Where no DOF varies in both sequences nothing correlates, no
+warp is better than that one, and none is tried. Of equal values the shorter segment is taken, then the larger
 slack that is used up.
 """
 
@@ -86,8 +87,11 @@ def cotw_search(
             f"the whole grid for a reference of {pair.frames} frames would take hours (at most "
             f"{MOST_GRID_FRAMES}); search with effort='fast'"
         )
-    if effort == "full" or pair.frames <= _FRAMES_OF_A_FULL_GRID:
-        warps: Iterable[GridWarp] = all_warps(
+    warps: Iterable[GridWarp]
+    if not (pair.source_varies & pair.target_varies).any():
+        warps = ()
+    elif effort == "full" or pair.frames <= _FRAMES_OF_A_FULL_GRID:
+        warps = all_warps(
             pair, range(SHORTEST_SEGMENT, pair.frames // 2 + 1), LEAST_LENGTH, spacing, open_ends
         )
     else:

@@ -188,6 +188,32 @@ def checked_stack(clips: FloatArray) -> FloatArray:
     return clips
 
 
+def at_a_clear_size(*sequences: FloatArray) -> tuple[tuple[FloatArray, ...], int]:
+    """Bring sequences whose squares would underflow or overflow to a size at which they do not.
+
+    All are multiplied by one power of two, which rounds nothing, so what compares or correlates them finds
+    what it would find in any other unit. Sequences of a usual size are left alone.
+
+    Parameters
+    ----------
+    sequences : array (frames, any dofs)
+        Checked sequences; of those that are to keep their proportion, all at once.
+
+    Returns
+    -------
+    sequences : tuple of array
+        In the dtypes given.
+    exponent : int
+        Of the power of two; 0 where they were left alone. ``np.ldexp(result, -exponent)`` is in the old unit.
+    """
+    largest = max(float(np.abs(values).max()) for values in sequences)
+    limits = np.finfo(np.result_type(*sequences, np.float16))
+    if largest == 0 or float(limits.tiny) ** (1 / 3) <= largest <= float(limits.max) ** (1 / 3):
+        return sequences, 0
+    exponent = -int(np.frexp(largest)[1])
+    return tuple(np.ldexp(values, exponent) for values in sequences), exponent
+
+
 def checked_sequence(values: FloatArray, name: str) -> FloatArray:
     """Return a sequence as an array (frames, dofs), after checking that it is one.
 

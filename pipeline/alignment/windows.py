@@ -16,7 +16,7 @@ window is transposed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,25 @@ from motionary.pipeline.motion import FloatArray
 Limits = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 _ROUNDING = 1e-9  # of places in frames: what lies on the bound is inside
+_STEEPEST = 1e15  # frames a frame: as good as upright for any length, and far from overflow
 
 
+@runtime_checkable
 class Window(Protocol):
     """What bounds a path."""
 
     def limits(self, m: int, n: int) -> Limits:
         """Return the first and the last reference frame (m,) that each of m moving frames may meet.
+
+        Parameters
+        ----------
+        m, n : int
+            Frames of the moving sequence and of the reference.
+
+        Returns
+        -------
+        first, last : array (m,) int64
+            Inclusive.
 
         Raises
         ------
@@ -65,14 +77,30 @@ class SakoeChiba:
             raise ValueError(f"radius is {self.radius}; it is a share of the longer length, 0 or more")
 
     def limits(self, m: int, n: int) -> Limits:
-        """Return the first and the last column of every row (m,), inclusive; there always is a path."""
+        """Return the first and the last column of every row; there always is a path.
+
+        Parameters
+        ----------
+        m, n : int
+            Frames of the moving sequence and of the reference, at least 1.
+
+        Returns
+        -------
+        first, last : array (m,) int64
+            Inclusive.
+
+        Raises
+        ------
+        ValueError
+            A sequence has no frame.
+        """
         _check_lengths(m, n)
         if min(m, n) == 1:
             return np.zeros(m, dtype=np.int64), np.full(m, n - 1)
         slope = (n - 1) / (m - 1)
         steep = max(slope, 1 / slope)
         # Along the longer sequence: what the radius allows, and just less than what the line crosses.
-        reach = max(self.radius * max(m, n), (1 + steep) / 2 - 2 * _ROUNDING * steep)
+        reach = max(min(self.radius, 1.0) * max(m, n), (1 + steep) / 2 - 2 * _ROUNDING * steep)
         columns = reach * min(slope, 1.0)
         middle = np.arange(m) * slope
         return _whole(middle - columns, middle + columns, n)
@@ -100,30 +128,50 @@ class Itakura:
             raise ValueError(f"slope is {self.slope}; it is the greatest ratio of both speeds, 1 or more")
 
     def limits(self, m: int, n: int) -> Limits:
-        """Return the first and the last column of every row (m,), inclusive.
+        """Return the first and the last column of every row.
+
+        Parameters
+        ----------
+        m, n : int
+            Frames of the moving sequence and of the reference, at least 1.
+
+        Returns
+        -------
+        first, last : array (m,) int64
+            Inclusive.
 
         Raises
         ------
         ValueError
-            The lengths differ by more than the slope allows.
+            A sequence has no frame, or the lengths differ by more than the slope allows.
         """
         _check_lengths(m, n)
+        slope = min(self.slope, _STEEPEST)
         shorter, longer = min(m, n) - 1, max(m, n) - 1
-        if longer > self.slope * shorter * (1 + _ROUNDING):
+        if longer > slope * shorter * (1 + _ROUNDING):
             mend = f"a slope of {longer / shorter:.3g} or more" if shorter else "more than one frame of each"
             raise ValueError(
                 f"an Itakura window of slope {self.slope:g} leaves no path between {m} moving and {n} "
                 f"reference frames: it needs {mend}; else bring them nearer in length first, by `uniform`"
             )
         rows = np.arange(m)
-        early, late = self._from_corner(rows)
-        back_late, back_early = self._from_corner(rows[::-1])
+        early, late = _from_corner(rows, slope)
+        back_late, back_early = _from_corner(rows[::-1], slope)
         return _whole(np.maximum(early, n - 1 - back_early), np.minimum(late, n - 1 - back_late), n)
 
-    def _from_corner(self, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-        """Bound the columns whose squares meet the two sides that leave the first corner."""
-        inside = 0.5 - 2 * _ROUNDING  # half a square: one that is met in a corner alone is not met
-        return (rows - inside) / self.slope - inside, (rows + inside) * self.slope + inside
+
+def _from_corner(rows: NDArray[np.int64], slope: float) -> tuple[FloatArray, FloatArray]:
+    """Bound the columns whose squares meet the two sides that leave the first corner."""
+    inside = 0.5 - 2 * _ROUNDING  # half a square: one that is met in a corner alone is not met
+    return (rows - inside) / slope - inside, (rows + inside) * slope + inside
+
+
+def check_window(window: Window | None) -> None:
+    """Raise TypeError where this is no window, and not None."""
+    if window is not None and (isinstance(window, type) or not isinstance(window, Window)):
+        raise TypeError(
+            f"window is {window!r}; it must be a window such as SakoeChiba(0.1) or Itakura(2.0), or None"
+        )
 
 
 def _whole(low: FloatArray, high: FloatArray, n: int) -> Limits:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
+from motionary.pipeline.alignment.warp import checked_sequence
 from motionary.pipeline.motion import FloatArray
 
 
@@ -114,23 +115,12 @@ def longest_stay(path: ArrayLike) -> int:
 
 
 def _checked_path(path: ArrayLike, name: str) -> FloatArray:
-    return _checked(path, name, ("step", "sequence"))
+    """Return a path, whose rows are frames of its own time and whose DOFs are the sequences', as float64."""
+    return checked_sequence(np.asarray(path), name).astype(np.float64)
 
 
 def _checked_times(times: ArrayLike, name: str) -> FloatArray:
-    return _checked(times, name, ("target frame",))
-
-
-def _checked(values: ArrayLike, name: str, axes: tuple[str, ...]) -> FloatArray:
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{name} holds values of type {array.dtype}; they must be real numbers")
-    if array.ndim != len(axes) or not array.size:
-        needed = ", ".join(f"{axis}s" for axis in axes)
-        raise ValueError(f"{name} has shape {array.shape}; it needs ({needed}), at least one of each")
-    array = array.astype(np.float64)
-    if not np.isfinite(array).all():
-        place = np.argwhere(~np.isfinite(array))[0]
-        where = ", ".join(f"{axis} {index}" for axis, index in zip(axes, place, strict=True))
-        raise ValueError(f"{name} holds {array[tuple(place)]} at {where}; frames must be finite")
-    return array
+    array = np.asarray(times)
+    if array.ndim != 1:
+        raise ValueError(f"{name} has shape {array.shape}; it needs one time a target frame: (frames,)")
+    return _checked_path(array[:, None], name)[:, 0]

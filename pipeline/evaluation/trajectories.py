@@ -52,14 +52,33 @@ def kendall_tau_similarity(values: FloatArray, target: FloatArray) -> float:
     """
     from scipy.stats import kendalltau
 
-    values, target = checked_pair(values, target)
-    if len(values) != len(target):
-        raise ValueError(
-            f"values have {len(values)} frames and target {len(target)}; warp one into the other's time first"
-        )
+    values, target = _in_one_time(values, target)
     asked, moves = np.flatnonzero(_moves(target)), _moves(values)
     taus = [kendalltau(values[:, one], target[:, one]).statistic if moves[one] else 0.0 for one in asked]
     return float(np.mean(taus)) if taus else 0.0
+
+
+def mean_distance(values: FloatArray, target: FloatArray) -> float:
+    """Measure how far a warped sequence lies from the one whose time it is in: the mean over the frames.
+
+    Parameters
+    ----------
+    values, target : array (frames, columns)
+        Frame by frame in one time.
+
+    Returns
+    -------
+    float
+        Mean Euclidean distance of the two at a frame, in units of the values. The rival, the root of the
+        mean *squared* distance, gives more weight to the frames that are furthest off.
+
+    Raises
+    ------
+    ValueError
+        The two have other shapes, or a value is not finite.
+    """
+    values, target = _in_one_time(values, target)
+    return float(np.linalg.norm(values.astype(np.float64) - target, axis=1).mean())
 
 
 def joint_trajectories(rotations: FloatArray, directions: ArrayLike = ALONG_Y) -> FloatArray:
@@ -125,6 +144,15 @@ def jerk(values: FloatArray, rate: float = 1.0) -> float:
         raise ValueError(f"rate is {rate}; it must be positive, in frames a second")
     changes = np.diff(values.astype(np.float64), n=3, axis=0)
     return float(np.linalg.norm(changes, axis=1).mean() * rate**3)
+
+
+def _in_one_time(values: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    values, target = checked_pair(values, target)
+    if len(values) != len(target):
+        raise ValueError(
+            f"values have {len(values)} frames and target {len(target)}; warp one into the other's time first"
+        )
+    return values, target
 
 
 def _moves(values: FloatArray) -> NDArray[np.bool_]:

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -105,15 +107,24 @@ def test_coordinates_are_those_of_a_whitened_pca() -> None:
     # From the covariance, not from the singular values.
     scaled = (reference - reference.mean(axis=0)) * np.sqrt(weights)
     variances, axes = np.linalg.eigh(scaled.T @ scaled / 50)
+    others = (moving - reference.mean(axis=0)) * np.sqrt(weights)
     for k in range(3):
-        expected = scaled @ axes[:, -1 - k] / np.sqrt(variances[-1 - k])
-        assert min(np.abs(y[:, k] - expected).max(), np.abs(y[:, k] + expected).max()) < 1e-9
-    same = ((reference - reference.mean(axis=0)) * np.sqrt(weights))[:1]
-    np.testing.assert_allclose(
-        eigenposture_coordinates(reference[:1], reference, weights, 3)[0], y[:1], atol=1e-9
-    )
-    assert same.shape == (1, 6)
-    assert x.shape == (40, 3)
+        expected = np.concatenate([scaled, others]) @ axes[:, -1 - k] / np.sqrt(variances[-1 - k])
+        found = np.concatenate([y[:, k], x[:, k]])
+        assert min(np.abs(found - expected).max(), np.abs(found + expected).max()) < 1e-9
+
+
+def test_four_principal_postures_count_where_no_number_is_given() -> None:
+    rng = np.random.default_rng(3)
+    moving, reference = rng.normal(size=(50, 9)), rng.normal(size=(40, 9))
+    assert eigenposture_coordinates(moving, reference)[1].shape == (40, 4)
+    for align in (adaptive_dtw, constrained_dtw):
+        given, four, eight = (
+            align(moving, reference, slope_weight=1.0, **number).path
+            for number in ({}, {"components": 4}, {"components": 8})
+        )
+        np.testing.assert_array_equal(given, four)
+        assert not np.array_equal(given, eight)
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -148,9 +159,30 @@ def test_what_cannot_be_aligned_is_refused() -> None:
             align(values, values[:, :1])
         with pytest.raises(ValueError, match="components is 0"):
             align(values, values, components=0)
-        with pytest.raises(ValueError, match=r"slope_weight is 0\.5"):
-            align(values, values, slope_weight=0.5)
+        for weight in (0.5, -3.0, np.nan, np.inf, 2.0**257):
+            with pytest.raises(
+                ValueError, match=rf"slope_weight is {re.escape(str(weight))}; .* from 1 to 1\.1"
+            ):
+                align(values, values, slope_weight=weight)
+        align(values, values[::2], slope_weight=2.0**256)
         with pytest.raises(ValueError, match="weights have shape"):
             align(values, values, np.ones(3))
     with pytest.raises(ValueError, match="radius is -1"):
         adaptive_dtw(values, values, radius=-1)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e140])
+def test_the_smallest_and_the_largest_values_warp_as_others_do(size: float) -> None:
+    rng = np.random.default_rng(5)
+    moving, reference = rng.normal(size=(30, 4)).cumsum(axis=0), rng.normal(size=(36, 4)).cumsum(axis=0)
+    expected = adaptive_dtw(moving, reference).path
+    np.testing.assert_array_equal(adaptive_dtw(moving * size, reference * size).path, expected)
+
+
+@pytest.mark.parametrize(
+    ("setting", "problem"), [({"components": 2.5}, "components is 2.5"), ({"radius": 1.5}, "radius is 1.5")]
+)
+def test_numbers_of_postures_and_frames_are_whole(setting: dict[str, float], problem: str) -> None:
+    values = np.random.default_rng(6).normal(size=(12, 3))
+    with pytest.raises(ValueError, match=problem):
+        adaptive_dtw(values, values, **setting)

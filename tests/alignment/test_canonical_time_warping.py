@@ -150,3 +150,22 @@ def test_what_stands_still_correlates_with_nothing(other: np.ndarray) -> None:
 def test_what_cannot_be_aligned_is_refused(change: dict, problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         canonical_time_warping(**({"moving": curve(TIME), "reference": curve(TIME)} | change))
+
+
+@pytest.mark.parametrize("exponents", [(-700, -700), (-960, -960), (0, -900), (-900, 0)])
+def test_the_unit_changes_nothing_however_small(exponents: tuple[int, int]) -> None:
+    rng = np.random.default_rng(7)
+    moving, reference = rng.normal(size=(30, 3)).cumsum(axis=0), rng.normal(size=(25, 2)).cumsum(axis=0)
+    tiny = np.ldexp(moving, exponents[0]), np.ldexp(reference, exponents[1])
+    warp, small = canonical_time_warping(moving, reference), canonical_time_warping(*tiny)
+    np.testing.assert_array_equal(warp.path, small.path)
+    np.testing.assert_allclose(small.costs, warp.costs, rtol=1e-9)
+    for ours, theirs in zip(
+        small.embedding.project(tiny), warp.embedding.project((moving, reference)), strict=True
+    ):
+        np.testing.assert_allclose(np.abs(ours), np.abs(theirs), rtol=1e-7, atol=1e-9)
+
+
+def test_what_is_too_small_to_be_projected_is_refused() -> None:
+    with pytest.raises(ValueError, match="so small that its projection is beyond 64 bits"):
+        canonical_time_warping(1e-318 * curve(TIME), curve(TIME))

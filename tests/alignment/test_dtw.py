@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionary.pipeline.alignment.dtw import derivative_dtw, derivatives, dtw
+from motionary.pipeline.alignment.dtw import derivative_dtw, derivatives, dtw, nearest_path
 from motionary.pipeline.alignment.windows import Itakura, SakoeChiba
 
 
@@ -98,3 +98,27 @@ def test_a_constant_channel_has_a_warp_and_what_is_no_number_none() -> None:
         derivatives(broken)
     with pytest.raises(ValueError, match="no path between 7 moving and 3"):
         dtw(flat, flat[:3], window=Itakura(2.0))
+
+
+@pytest.mark.parametrize("align", [dtw, derivative_dtw, nearest_path])
+@pytest.mark.parametrize(
+    ("dtype", "exponent"), [("f8", -400), ("f8", -996), ("f8", -1020), ("f4", -100), ("f4", 120)]
+)
+def test_the_unit_changes_nothing_however_small_or_large(align, dtype: str, exponent: int) -> None:
+    rng = np.random.default_rng(5)
+    moving, reference = (rng.normal(size=(n, 3)).cumsum(axis=0).astype(dtype) for n in (30, 25))
+    path = [getattr(warp, "path", warp) for warp in (
+        align(moving, reference), align(np.ldexp(moving, exponent), np.ldexp(reference, exponent))
+    )]  # fmt: skip
+    np.testing.assert_array_equal(*path)
+    if align is dtw:
+        window = SakoeChiba(0.3)
+        small = dtw(np.ldexp(moving, exponent), np.ldexp(reference, exponent), window=window)
+        np.testing.assert_array_equal(small.path, dtw(moving, reference, window=window).path)
+
+
+@pytest.mark.parametrize("window", [0.1, "itakura", SakoeChiba, Itakura])
+@pytest.mark.parametrize("align", [dtw, derivative_dtw])
+def test_what_is_no_window_is_refused(align, window) -> None:
+    with pytest.raises(TypeError, match=r"window is .*; it must be .* SakoeChiba\(0.1\) or Itakura\(2.0\)"):
+        align(np.zeros((4, 1)), np.zeros((4, 1)), window=window)

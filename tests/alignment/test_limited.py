@@ -41,9 +41,9 @@ def test_the_path_is_the_least_of_those_allowed(m: int, n: int, most: int, seed:
         with pytest.raises(
             ValueError, match=f"at most {most} steps in a row .* {m} moving and {n} reference"
         ):
-            limited_dtw(moving, reference, most)
+            limited_dtw(moving, reference, most=most)
         return
-    path = limited_dtw(moving, reference, most).path
+    path = limited_dtw(moving, reference, most=most).path
     steps = np.diff(path, axis=0)
     assert ((steps >= 0) & (steps <= 1)).all()
     assert (path[0].tolist(), path[-1].tolist()) == ([0, 0], [m - 1, n - 1])
@@ -60,8 +60,31 @@ def test_without_a_need_to_stand_still_it_is_dtw() -> None:
     assert longest_stay(limited_dtw(values[::2], values).path) <= 2
 
 
+def test_weights_are_of_squared_differences() -> None:
+    rng = np.random.default_rng(4)
+    moving, reference = rng.normal(size=(31, 3)).cumsum(axis=0), rng.normal(size=(37, 3)).cumsum(axis=0)
+    weights = np.array([4.0, 0.0, 0.25])
+    found = limited_dtw(moving, reference, weights).path
+    scaled = moving[:, [0, 2]] * [2, 0.5], reference[:, [0, 2]] * [2, 0.5]
+    np.testing.assert_array_equal(found, limited_dtw(*scaled).path)
+    assert not np.array_equal(found, limited_dtw(moving, reference).path)
+    with pytest.raises(ValueError, match="weights have shape"):
+        limited_dtw(moving, reference, np.ones(2))
+
+
+def test_what_would_fill_the_memory_is_refused() -> None:
+    long = np.zeros((20_000, 1))
+    with pytest.raises(
+        ValueError,
+        match="20000 moving and 20000 reference frames: 2000000000 ways .* resample or cut the clips",
+    ):
+        limited_dtw(long, long)
+    with pytest.raises(ValueError, match="121 each, and at most 1073741824 .*, or allow fewer steps"):
+        limited_dtw(long[:3000], long[:3000], most=60)
+
+
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="most is 0"):
-        limited_dtw(np.zeros((3, 1)), np.zeros((3, 1)), 0)
+        limited_dtw(np.zeros((3, 1)), np.zeros((3, 1)), most=0)
     with pytest.raises(ValueError, match="moving holds inf"):
         limited_dtw(np.full((3, 1), np.inf), np.zeros((3, 1)))

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from motionary.pipeline.alignment.online import OnlineAligner, online_warp
+from motionary.pipeline.alignment.online import USUAL_WINDOWS, OnlineAligner, online_warp
 from motionary.pipeline.alignment.path_warp import path_warp
+from motionary.pipeline.alignment.rotation_costs import rotation_costs
 from motionary.pipeline.distances import dtw_path
 from motionary.pipeline.joint_rotations import joint_rotations
 from motionary.pipeline.readers import read_motion
@@ -42,6 +43,12 @@ def a_pair(seed: int, joints: int, frames: int, live: int) -> tuple[np.ndarray, 
     shown = in_other_time(motion, times) if frames > 1 else np.repeat(motion, live, axis=0)
     noise = Rotation.from_rotvec(rng.normal(scale=0.05, size=(live * joints, 3)))
     return motion, (noise * Rotation.from_quat(shown.reshape(-1, 4))).as_quat().reshape(live, joints, 4)
+
+
+def apart(shown, frame):
+    """Eq. 1 of two frames, as it is printed."""
+    dots = [abs(sum(p * q for p, q in zip(*two, strict=True))) for two in zip(shown, frame, strict=True)]
+    return sum(2 / math.pi * math.acos(min(1.0, dot)) for dot in dots)
 
 
 class Naive:
@@ -82,9 +89,7 @@ class Naive:
         return advance <= 3 and before[-3:] != [0, 0, 0]
 
     def _cost(self, row, frame):
-        shown = self.prerecorded[self.maps[-1] + row]
-        dots = [abs(sum(p * q for p, q in zip(*two, strict=True))) for two in zip(shown, frame, strict=True)]
-        return sum(2 / math.pi * math.acos(min(1.0, dot)) for dot in dots)
+        return apart(self.prerecorded[self.maps[-1] + row], frame)
 
     def _forecast(self):
         before, now = (Rotation.from_quat(frame) for frame in self.live[-2:])
@@ -114,7 +119,7 @@ class Naive:
         met = {}
         while (i, j) not in ((0, 1), (1, 0), (0, 0)):
             met[j] = i
-            i, j = min(before(i, j), key=lambda one: total[one])
+            i, j = min(before(i, j), key=lambda one: (total[one], abs(one[0] - one[1])))
         met[j] = i
         return met[1]
 
@@ -206,6 +211,14 @@ def test_type_v_changes_nothing_that_it_allows(seed, method, window):
             assert bound.push(frame) - before.frame == advance
         else:
             bound.push(frame)
+
+
+@pytest.mark.parametrize("method", ["A", "B", "C"])
+def test_a_still_beginning_longer_than_the_window_is_left_again(method):
+    angle = np.concatenate([np.zeros(14), np.arange(1, 9) * 0.1])
+    motion = Rotation.from_rotvec(angle[:, None] * [1.0, 0, 0]).as_quat()[:, None]
+    np.testing.assert_array_equal(online_warp(motion, motion, method, 5).path[:15, 0], np.arange(15))
+    assert online_warp(motion, motion, method, 5).path[-1, 0] == len(motion) - 1
 
 
 @settings(max_examples=30, deadline=None)
@@ -324,6 +337,8 @@ def test_the_caller_may_reuse_its_arrays():
         ({"method": "D"}, "no method 'D'; there are A, B, C"),
         ({"window": 0}, "window is 0"),
         ({"window": 2.5}, "window is 2.5"),
+        ({"window": math.inf}, "window is inf"),
+        ({"window": 1001}, "1 to 1000"),
         ({"constraint": "type-i"}, "no constraint 'type-i'; there is 'type-v'"),
         ({"missing": "wait"}, "missing is 'wait'"),
     ],
@@ -346,6 +361,64 @@ def test_prerecorded_frames_are_checked():
         online_warp(good, good[:, :1])
 
 
+def test_the_usual_windows_are_the_papers():
+    motion = wandering(np.random.default_rng(0), 3, 2)
+    assert {method: OnlineAligner(motion, method).window for method in USUAL_WINDOWS} == {
+        "A": 2, "B": 40, "C": 40
+    }  # fmt: skip
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds, joints=st.integers(1, 4), frames=st.integers(1, 6), others=st.integers(1, 6))
+def test_costs_are_equation_1_of_any_two_frames(seed, joints, frames, others):
+    rng = np.random.default_rng(seed)
+    one, other = (
+        Rotation.random(n * joints, rng=rng).as_quat().reshape(n, joints, 4) for n in (frames, others)
+    )
+    other[0] = one[-1]
+    costs = rotation_costs(one, -other)
+    assert costs.shape == (frames, others)
+    for i, k in np.ndindex(costs.shape):
+        assert costs[i, k] == pytest.approx(apart(one[i], other[k]), abs=1e-6)
+    assert costs[-1, 0] == 0
+
+
+def test_costs_keep_the_digits_of_small_turns():
+    angles = 10.0 ** -np.arange(1, 12)
+    turned = Rotation.from_rotvec(np.outer(angles, [0, 1, 0])).as_quat()[:, None]
+    found = rotation_costs(turned, [[[0, 0, 0, 1]]])[:, 0]
+    np.testing.assert_allclose(found, angles / np.pi, rtol=1e-9)
+
+
+def test_costs_of_what_cannot_be_compared_are_refused():
+    good = wandering(np.random.default_rng(0), 5, 2)
+    with pytest.raises(ValueError, match=r"b has shape \(5, 1, 4\).*\(n, 2, 4\)"):
+        rotation_costs(good, good[:, :1])
+    with pytest.raises(ValueError, match=r"a, frame 0, joint 0 holds .* normalise it$"):
+        rotation_costs(2 * good, good)
+
+
+@pytest.mark.parametrize(
+    ("microseconds", "window", "code", "said"),
+    [
+        (8333, 40, 0, "within 8333 us, windows up to 40: met by every method"),
+        (8334, 40, 1, "windows up to 40: MISSED by B, window 40, 8 joints"),
+        (99999, 80, 0, "met by every method"),
+    ],
+)
+def test_the_benchmark_judges_medians_by_the_time_of_a_frame(
+    tmp_path, capsys, monkeypatch, microseconds, window, code, said
+):
+    def timed(method, width, joints, frames):
+        slow = (method, width, joints) == ("B", window, 8)
+        return [1.0, microseconds if slow else 2.0, 1e6]  # the longest is no median
+
+    monkeypatch.setattr(online, "_samples", timed)
+    assert online.main(["--json", str(tmp_path / "online.json")]) == code
+    assert said in capsys.readouterr().out
+    assert online.main(["--quick", "--json", str(tmp_path / "online.json")]) == 0
+
+
 def test_the_benchmark_runs(tmp_path, capsys):
     assert online.main(["--quick", "--json", str(tmp_path / "made" / "online.json")]) == 0
     figures = json.loads((tmp_path / "made" / "online.json").read_text())["figures"]
@@ -362,8 +435,7 @@ def test_real_takes_of_two_people_are_followed(shared_data, method):
         for one in ("bd_jogLeftCircle4StepsRstart_001", "bk_jogLeftCircle4StepsRstart_003")
     ]
     moving, reference = (joint_rotations(read_motion(shared_data / "hdm05" / one)) for one in takes)
-    cosines = np.abs(np.einsum("ijk,ljk->ilj", moving, reference))
-    dtw = path_warp(dtw_path((2 / np.pi * np.arccos(np.minimum(1, cosines))).sum(axis=-1)), len(moving))
+    dtw = path_warp(dtw_path(rotation_costs(moving, reference)), len(moving))
     warp = online_warp(moving, reference, method, None, "type-v")
     assert np.abs(warp.source_time - dtw.source_time).mean() < 18
 

@@ -5,8 +5,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.alignment.adaptive import adaptive_dtw
-from motionary.pipeline.alignment.postures import linearised_postures, posture_weights
-from motionary.pipeline.canonical import UnknownSkeletonError
+from motionary.pipeline.alignment.postures import (
+    linearised_postures,
+    posture_weights,
+    weighted_postures,
+)
+from motionary.pipeline.canonical import (
+    CANONICAL_JOINTS,
+    Convention,
+    UnknownSkeletonError,
+    canonical_indices,
+    find_convention,
+)
 from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.readers import read_motion
 from motionary.pipeline.synthetic import synthetic_library
@@ -68,7 +78,7 @@ def test_markers_have_no_postures() -> None:
     motion = arm(turns(*np.zeros((3, 6, 3))))
     markers = replace(motion, rotations=np.empty((6, 0, 4)), places=np.zeros((6, 3, 3)), name="dots")
     for pair in ((markers, motion), (motion, markers)):
-        with pytest.raises(ValueError, match="'dots' has markers and no rotations"):
+        with pytest.raises(ValueError, match="'dots' was captured as markers, .* reads features"):
             linearised_postures(*pair, 30.0)
 
 
@@ -105,6 +115,39 @@ def test_weights_are_of_limbs_and_of_the_mass_that_is_moved() -> None:
 def test_a_skeleton_of_no_convention_has_no_weights() -> None:
     with pytest.raises(UnknownSkeletonError):
         posture_weights(arm(turns(*np.zeros((3, 2, 3)))).skeleton)
+
+
+def test_weighted_postures_need_no_weights_besides() -> None:
+    moving, reference = (
+        take.motion
+        for take in synthetic_library()
+        if take.path in ("walk/walk_energetic_dora_01.bvh", "walk/walk_tired_bea_02.bvh")
+    )
+    plain = linearised_postures(moving, reference, 30.0)
+    weights = posture_weights(reference.skeleton)
+    weighted = weighted_postures(moving, reference, 30.0)
+    for ours, raw in zip(weighted, plain, strict=True):
+        np.testing.assert_allclose(ours**2, raw**2 * weights, rtol=1e-12)
+    warp = adaptive_dtw(*plain, weights)
+    np.testing.assert_array_equal(adaptive_dtw(*weighted).path, warp.path)
+    assert not np.array_equal(adaptive_dtw(*plain).path, warp.path)
+
+
+def test_weighted_postures_know_a_users_own_joint_names() -> None:
+    motion = synthetic_library()[0].motion
+    own = find_convention(motion.skeleton.names)
+    skeleton = replace(motion.skeleton, names=tuple(f"q{k}" for k in range(len(motion.skeleton.names))))
+    places = canonical_indices(motion.skeleton, own)
+    mine = Convention("mine", {joint: f"q{k}" for joint, k in zip(CANONICAL_JOINTS, places, strict=True)})
+    renamed = replace(motion, skeleton=skeleton)
+    for ours, usual in zip(
+        weighted_postures(renamed, renamed, 30.0, [mine]),
+        weighted_postures(motion, motion, 30.0),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(ours, usual)
+    with pytest.raises(UnknownSkeletonError):
+        weighted_postures(renamed, renamed, 30.0)
 
 
 def test_every_take_of_the_embedded_library_has_postures_and_weights() -> None:

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from motionary.pipeline.alignment.procrustes import (
-    one_frame_a_step,
     procrustes_derivative_dtw,
     procrustes_dtw,
     procrustes_motion_warping,
-    uniform_path,
 )
+from motionary.pipeline.alignment.steps_to_mean import one_frame_a_step, uniform_path
 from motionary.pipeline.evaluation.paths import path_error
 
 METHODS = (procrustes_dtw, procrustes_derivative_dtw, procrustes_motion_warping)
@@ -139,6 +138,20 @@ def test_speeds_are_recovered():
     start = uniform_path([40, 50], 60)
     assert path_error(procrustes_dtw(sequences, 60).path, truth) < path_error(start, truth) / 4
     assert path_error(procrustes_derivative_dtw(sequences, 60).path, truth) < path_error(start, truth) / 2
+
+
+def test_the_derivatives_are_keogh_and_pazzanis():
+    rng = np.random.default_rng(7)
+    walks = [rng.normal(size=(frames, 2)).cumsum(axis=0) for frames in (12, 15)]
+    estimates = []
+    for walk in walks:
+        inner = [
+            ((walk[i] - walk[i - 1]) + (walk[i + 1] - walk[i - 1]) / 2) / 2 for i in range(1, len(walk) - 1)
+        ]
+        estimates.append(np.array([inner[0], *inner, inner[-1]]))
+    found, expected = procrustes_derivative_dtw(walks), procrustes_dtw(estimates)
+    np.testing.assert_array_equal(found.path, expected.path)
+    np.testing.assert_allclose(found.mean, expected.mean, atol=1e-12)
 
 
 def test_an_offset_moves_nothing_of_derivatives_and_much_of_frames():

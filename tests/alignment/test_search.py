@@ -150,6 +150,23 @@ def test_the_fast_search_loses_little_on_real_clips(shared_data) -> None:
     assert max(losses) <= 0.01
 
 
+@pytest.mark.parametrize("effort", ["full", "fast"])
+def test_where_nothing_correlates_no_warp_is_tried(effort: str, monkeypatch) -> None:
+    def searched(*arguments):
+        raise AssertionError("searched")
+
+    monkeypatch.setattr("motionary.pipeline.alignment.search.all_warps", searched)
+    monkeypatch.setattr("motionary.pipeline.alignment.search.refined_warps", searched)
+    walk = np.random.default_rng(0).normal(size=(120, 3)).cumsum(axis=0)
+    apart = walk * [1.0, 0, 1], walk[:110] * [0.0, 1, 1], [1.0, 2.0, 0.0]
+    for moving, reference, weights in ((walk[:1], walk, None), (walk, np.ones((90, 3)), None), apart):
+        warp = cotw_search(moving, reference, weights, effort=effort)
+        np.testing.assert_allclose(warp.source_time, uniform(moving, reference).source_time, atol=1e-12)
+        assert (warp.segment_length, warp.slack) == (len(reference), 0)
+        assert (warp.correlation, warp.distortion, warp.objective) == (0, 0, 0)
+        assert warp.eta.tolist() == [0]
+
+
 @pytest.mark.parametrize(
     ("options", "problem"),
     [

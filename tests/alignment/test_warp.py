@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from motionary.pipeline.alignment import Warp, uniform
+from motionary.pipeline.alignment.warp import at_a_clear_size
 from motionary.pipeline.motion import Motion, Skeleton
 
 FINITE = st.floats(-1e3, 1e3, allow_subnormal=False)
@@ -127,3 +128,19 @@ def test_uniform_between_equal_lengths_changes_nothing() -> None:
 def test_uniform_refuses_what_is_no_sequence(bad: np.ndarray) -> None:
     with pytest.raises(ValueError, match="reference"):
         uniform(np.zeros((3, 1)), bad)
+
+
+@pytest.mark.parametrize("factor", [1e-323, 1e-300, 1e-104, 1e120])
+def test_a_clear_size_is_a_power_of_two_away(factor: float) -> None:
+    one, other = factor * np.array([[1.0, -3.0], [0.5, 0.0]]), factor * np.array([[0.25], [2.0]])
+    (large, small), exponent = at_a_clear_size(one, other)
+    assert 0.5 <= np.abs(large).max() < 1
+    np.testing.assert_array_equal(np.ldexp(large, -exponent), one)
+    np.testing.assert_array_equal(np.ldexp(small, -exponent), other)
+
+
+@pytest.mark.parametrize("values", [np.zeros((3, 2)), np.full((3, 2), 1e-90), np.ones((3, 2), dtype=bool)])
+def test_a_usual_size_is_left_alone(values: np.ndarray) -> None:
+    (same,), exponent = at_a_clear_size(values)
+    assert same is values
+    assert exponent == 0

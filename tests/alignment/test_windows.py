@@ -112,3 +112,9 @@ def test_a_parallelogram_needs_a_slope(slope: float) -> None:
 def test_nothing_has_no_window(window: Window) -> None:
     with pytest.raises(ValueError, match="0 and 3 frames"):
         window.limits(0, 3)
+
+
+@pytest.mark.parametrize("greatest", [1.7e308, np.float64(1.7e308)])
+def test_a_window_of_any_size_holds_all_cells(greatest: float) -> None:
+    for window in (SakoeChiba(greatest), Itakura(greatest)):
+        assert cells(window, 40, 7).all()

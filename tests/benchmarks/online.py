@@ -71,9 +71,8 @@ def _measured(quick: bool) -> Iterator[Figure]:
             what = f"{method}, window {window}, {joints} joints, us a frame"
             judged = window <= JUDGED_WINDOW
             required = FRAME if judged else None
-            yield Figure(
-                f"{what}{said}", median(samples), ".0f", required, binding=judged and not quick, samples=samples
-            )
+            binds = judged and not quick
+            yield Figure(f"{what}{said}", median(samples), ".0f", required, binding=binds, samples=samples)
             yield Figure(f"{what}, 99th percentile", float(np.percentile(samples, 99)), ".0f", required)
 
 

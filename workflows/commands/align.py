@@ -11,7 +11,7 @@ import typer
 from motionary.workflows.commands.options import AtSnapshot, OutputFormat, compile_first, open_catalog
 
 if TYPE_CHECKING:
-    from motionary.catalog.views.alignment_chart import Way
+    from motionary.catalog.views.alignment_ways import Way
 
 EXAMPLES = {
     "align": (
@@ -22,23 +22,23 @@ EXAMPLES = {
     )
 }
 
-METHODS = (
-    "uniform",
-    "dtw",
-    "dtw-sakoe-chiba",
-    "dtw-itakura",
-    "limited-dtw",
-    "derivative-dtw",
-    "iterative-motion-warping",
-    "canonical-time-warping",
-    "generalized-time-warping",
-    "cotw",
-    "adaptive-dtw",
-    "online-a",
-    "online-b",
-    "online-c",
-)
-"""The keys of `motionary.pipeline.alignment.registry.ALIGNERS`, which help must not import."""
+METHODS = {
+    "uniform": "UTW",
+    "dtw": "DTW",
+    "dtw-sakoe-chiba": "DTW, Sakoe-Chiba",
+    "dtw-itakura": "DTW, Itakura",
+    "limited-dtw": "DTW, 2 steps",
+    "derivative-dtw": "DDTW",
+    "iterative-motion-warping": "IMW",
+    "canonical-time-warping": "CTW",
+    "generalized-time-warping": "GTW",
+    "cotw": "CoTW",
+    "adaptive-dtw": "adaptive DTW",
+    "online-a": "online A",
+    "online-b": "online B",
+    "online-c": "online C",
+}
+"""Names and titles of `motionary.pipeline.alignment.registry.ALIGNERS`, which help must not import."""
 
 EVERY = "all"
 
@@ -55,7 +55,7 @@ def align(
         list[str] | None,
         typer.Option(
             "--method",
-            help=f"{', '.join(METHODS)}; repeat it to compare some, or {EVERY}.",
+            help=f"{', '.join(METHODS)}, or as in papers (DDTW, GTW); repeat it to compare some, or {EVERY}.",
             show_default="cotw",
             autocompletion=lambda: [*METHODS, EVERY],
         ),
@@ -83,7 +83,7 @@ def align(
     url, moving, reference = _named(takes)
     if snapshot is not None and url is None:
         raise typer.BadParameter("--snapshot is of a catalog: give CATALOG A B")
-    methods = _checked_methods(method or ["cotw"])
+    asked = _checked_methods(method or ["cotw"])
     ways = _checked_ways(joint, plot)
     _check_plot(plot)
     from contextlib import nullcontext
@@ -97,7 +97,7 @@ def align(
         pair = read_pair(moving, reference, catalog)
     compile_first()
     with threadpool_limits(1):  # products of matrices this small lose by being shared among threads
-        made = align_pair(pair, methods, lenient=EVERY in (method or ()))
+        made = align_pair(pair, [*METHODS] if EVERY in asked else asked, lenient=EVERY in asked)
     for name, why in made.refused.items():
         print(f"motionary: {name} is left out: {why}", file=sys.stderr)
     if plot is not None:
@@ -112,12 +112,19 @@ def _named(takes: list[str]) -> tuple[str | None, str, str]:
 
 
 def _checked_methods(methods: list[str]) -> list[str]:
+    """Return the names of methods, which may be given by their titles or as functions are written, too."""
+    known = {EVERY: EVERY}
+    for name, title in METHODS.items():
+        known |= {name: name, title.lower(): name}
+    asked = []
     for one in methods:
-        if one not in (*METHODS, EVERY):
+        plain = one.strip().lower().replace("_", "-")
+        if plain not in known:
             raise typer.BadParameter(
                 f"{one!r} is none of {', '.join(METHODS)}, {EVERY}", param_hint="--method"
             )
-    return [*METHODS] if EVERY in methods else methods
+        asked.append(known[plain])
+    return asked
 
 
 def _checked_ways(joints: list[str] | None, plot: Path | None) -> list[Way] | None:

@@ -2,15 +2,17 @@
 
 **[ADTW]** Heloir, Courty, Gibet, Multon, *Temporal alignment of communicative gesture sequences*. The paper
 aligns records of one long sequence of signs, a minute each, to the first of them, and shows what comes out as
-curves: it prints no number. Here two takes of one action are aligned, by two people where that is known; and
-sequences made of takes: the moving takes of every action's first pair joined one after another, and the
-references of these pairs likewise, then those of the second pairs, and so on. Where takes meet, the joined
-motion leaps. Only clips whose joints have the same names can be compared, and clips of markers not at all.
+curves: it prints no number. Here two takes of one action are aligned, of two people first where that is
+known; and sequences made of takes: of one rig the moving takes of the actions' first pairs joined one after
+another, and the references of these pairs likewise, then those of the second pairs, and so on. Where takes
+meet, the joined motion leaps. Only clips whose joints have the same names can be compared, and clips of
+markers not at all; of the actions with such clips six are drawn, so that what is joined stays a sequence of
+minutes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,9 +36,10 @@ from motionary.workflows.reproduce.adaptive_dtw_measures import (
 from motionary.workflows.reproduce.cotw_measures import Measurement, Measurements, known_takes
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.labelled import LabelledClips, labelled_clips
-from motionary.workflows.reproduce.pairs import Pair, draw_actions
+from motionary.workflows.reproduce.pairs import MOST_ACTIONS, MOST_CLIPS, Pair
 
-_ALL = 1_000_000  # draws: every pair, so that enough are left of those that can be compared
+Group = tuple[str, frozenset[str]]
+"""An action, and the names of the joints of those of its clips that can be compared with each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +94,9 @@ def study_adaptive_dtw(
     names = set(template(synthetic_library()[0].action).skeleton.names)
     takes = [one for one in known_takes(synthetic_library()) if set(one.motion.skeleton.names) == names]
     several = sum(len(of_action) for of_action in pairs.values())
+    joined = pairs_to_join(library, pairs)
     rows: list[Measurement] = []
-    with show({"align": several, "sequences": draws, "known warps": len(takes)}) as advance:
+    with show({"align": several, "sequences": len(joined), "known warps": len(takes)}) as advance:
         _load_kernels(library, pairs)
         for action, of_action in pairs.items():
             for pair in of_action:
@@ -100,32 +104,75 @@ def study_adaptive_dtw(
                 rows += _measure(TAKES, action, pair, motions, library)
                 rows += _measure(SETTINGS, action, pair, motions, library, WITH_SETTINGS)
                 advance("align")
-        for k in range(draws):
-            for together in _of_one_rig([of[k] for of in pairs.values() if k < len(of)], library):
-                sides = [_joined([library.read(pair[side]) for pair in together], library) for side in (0, 1)]
-                ends = (" + ".join(pair[side] for pair in together) for side in (0, 1))
-                rows += _measure(SEQUENCES, "all", (next(ends), next(ends)), sides, library)
+        for together in joined:
+            sides = [_joined([library.read(pair[side]) for pair in together], library) for side in (0, 1)]
+            moving, reference = (" + ".join(pair[side] for pair in together) for side in (0, 1))
+            rows += _measure(SEQUENCES, "several", (moving, reference), sides, library)
             advance("sequences")
         for take in takes:
             rows += measure_known(take)
             advance("known warps")
-    return AdaptiveExperiment(Measurements(rows), _notes(library, rows, several, catalog, seed))
+    return AdaptiveExperiment(Measurements(rows), _notes(library, rows, pairs, catalog, seed))
 
 
 def comparable_pairs(library: Library, draws: int, seed: int) -> dict[str, list[Pair]]:
-    """Draw pairs of clips with the same joints, for each action that has some."""
-    found = {}
-    for action in draw_actions(library.clips, _ALL, seed):
-        every = next(iter(action.pairs.values()))
-        alike = [
-            pair
-            for pair in every
-            if all(one in library.joints for one in pair)
-            and set(library.joints[pair[0]]) == set(library.joints[pair[1]])
-        ]
-        if alike:
-            found[action.name] = alike[:draws]
-    return found
+    """Draw ordered pairs of clips of one action and with the same joints.
+
+    Parameters
+    ----------
+    library : Library
+        Of which to draw; of more than 200 clips of one action and rig, 200 are drawn first.
+    draws : int
+        Pairs of every action; all, where there are fewer.
+    seed : int
+        Of NumPy's PCG64. More draws keep the first ones.
+
+    Returns
+    -------
+    dict of str to list of Pair
+        By action, six at most of those that have some: pairs of two people first, where subjects are known.
+    """
+    clips = library.clips
+    who = dict(zip(clips.clip_ids, clips.classes if clips.subjects is None else clips.subjects, strict=True))
+    possible: dict[str, list[Pair]] = {}
+    for place, ((action, _), ids) in enumerate(_comparable(library).items()):
+        some = np.random.default_rng([seed, place]).permutation(len(ids))[:MOST_CLIPS]
+        chosen = [ids[one] for one in np.sort(some)]
+        possible.setdefault(action, []).extend(
+            (one, other) for one in chosen for other in chosen if one != other
+        )
+    drawn = {}
+    for place in np.sort(np.random.default_rng(seed).permutation(len(possible))[:MOST_ACTIONS]).tolist():
+        action, pairs = list(possible.items())[place]
+        order = np.random.default_rng([seed, place]).permutation(len(pairs))
+        shuffled = [pairs[one] for one in order]
+        drawn[action] = sorted(shuffled, key=lambda pair: who[pair[0]] == who[pair[1]])[:draws]
+    return drawn
+
+
+def pairs_to_join(library: Library, pairs: Mapping[str, list[Pair]]) -> list[list[Pair]]:
+    """Put together, rig by rig, the first pairs of the actions, then the second ones, two or more each."""
+    by_rig: dict[frozenset[str], dict[str, list[Pair]]] = {}
+    for action, of_action in pairs.items():
+        for pair in of_action:
+            rig = by_rig.setdefault(frozenset(library.joints[pair[0]]), {})
+            rig.setdefault(action, []).append(pair)
+    together = [
+        [of_action[k] for of_action in actions.values() if k < len(of_action)]
+        for actions in by_rig.values()
+        for k in range(max(map(len, actions.values())))
+    ]
+    return [some for some in together if len(some) > 1]
+
+
+def _comparable(library: Library) -> dict[Group, list[str]]:
+    """List the clips of every action and rig that has two or more, by action and by first clip."""
+    groups: dict[Group, list[str]] = {}
+    for clip_id, action in zip(library.clips.clip_ids, library.clips.classes.tolist(), strict=True):
+        if clip_id in library.joints:
+            groups.setdefault((action, frozenset(library.joints[clip_id])), []).append(clip_id)
+    several = ((group, ids) for group, ids in groups.items() if len(ids) > 1)
+    return dict(sorted(several, key=lambda found: found[0][0]))
 
 
 def _embedded() -> Library:
@@ -167,14 +214,6 @@ def _load_kernels(library: Library, pairs: dict[str, list[Pair]]) -> None:
     _measure("", action, pair, [library.read(one) for one in pair], library)
 
 
-def _of_one_rig(pairs: Sequence[Pair], library: Library) -> Iterator[list[Pair]]:
-    """Part pairs by the names of their joints, and pass over what stands alone."""
-    groups: dict[frozenset[str], list[Pair]] = {}
-    for pair in pairs:
-        groups.setdefault(frozenset(library.joints[pair[0]]), []).append(pair)
-    return (group for group in groups.values() if len(group) > 1)
-
-
 def _joined(motions: Sequence[Motion], library: Library) -> Motion:
     """Show motions of the same joints one after another, at the library's rate."""
     first, *others = (at_rate(motion, library.rate) for motion in motions)
@@ -188,11 +227,16 @@ def _joined(motions: Sequence[Motion], library: Library) -> Motion:
 
 
 def _notes(
-    library: Library, rows: Sequence[Measurement], pairs: int, catalog: Catalog | None, seed: int
+    library: Library,
+    rows: Sequence[Measurement],
+    pairs: Mapping[str, list[Pair]],
+    catalog: Catalog | None,
+    seed: int,
 ) -> list[str]:
     where = "the embedded library" if catalog is None else catalog.store.url
-    joined = len({row.moving for row in rows if row.part == SEQUENCES})
+    joined = len({(row.moving, row.reference) for row in rows if row.part == SEQUENCES})
+    actions = len(set(library.clips.classes.tolist()))
     return [
-        f"{pairs} pairs of takes and {joined} sequences of takes joined, of {where}, seed {seed}, at "
-        f"{library.rate:g} frames a second."
+        f"Pairs of takes: {sum(map(len, pairs.values()))}, of {len(pairs)} of {actions} actions; of "
+        f"sequences of takes joined: {joined}. Of {where}, seed {seed}, at {library.rate:g} frames a second."
     ]

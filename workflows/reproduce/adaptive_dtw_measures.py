@@ -16,9 +16,9 @@ from motionary.pipeline.alignment.adaptive import adaptive_dtw, constrained_dtw,
 from motionary.pipeline.alignment.dtw import dtw
 from motionary.pipeline.alignment.limited import limited_dtw
 from motionary.pipeline.alignment.path_warp import PathWarp
-from motionary.pipeline.alignment.postures import linearised_postures, posture_weights
+from motionary.pipeline.alignment.postures import weighted_postures
 from motionary.pipeline.canonical import Convention
-from motionary.pipeline.evaluation import jerk, longest_stay, path_deviation
+from motionary.pipeline.evaluation import jerk, longest_stay, mean_distance, path_deviation
 from motionary.pipeline.features import sample_times
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.synthetic import TEMPLATE_FPS, SyntheticTake, template
@@ -80,12 +80,16 @@ def measure_pair(
     list of Measurement
         For every method, in frames, the deviation from the plain DTW's path and the longest stay; the jerk of
         what the warp shows over the reference's own; the mean distance of what it shows from the reference;
-        the seconds that the path took. Nothing of a method that finds no path between these lengths, and
+        the seconds that the method took on the coordinates, of which those that pay for standing still seek
+        the principal ones once more. Nothing of `LIMITED` where it finds no path between these lengths, and
         nothing at all where the reference has no jerk.
+
+    Raises
+    ------
+    ValueError
+        The motions cannot be compared, or any other method cannot align them.
     """
-    one, other = eigenposture_coordinates(
-        *linearised_postures(moving, reference, rate), posture_weights(reference.skeleton, conventions)
-    )
+    one, other = eigenposture_coordinates(*weighted_postures(moving, reference, rate, conventions))
     own_jerk = jerk(other) if len(other) >= _LEAST_FRAMES else 0.0
     if not own_jerk:
         return []
@@ -95,14 +99,16 @@ def measure_pair(
         start = perf_counter()
         try:
             warp = align(one, other)
-        except ValueError:  # such lengths have no path of short stays
-            continue
+        except ValueError:
+            if name != LIMITED:
+                raise
+            continue  # such lengths have no path of short stays, or are too long for it
         seconds, shown = perf_counter() - start, warp.apply(one)
         values = {
             "deviation": path_deviation(warp.source_time, plain.source_time),
             "stay": float(longest_stay(warp.path)),
             "jerk": jerk(shown) / own_jerk,
-            "distance": float(np.linalg.norm(shown - other, axis=1).mean()),
+            "distance": mean_distance(shown, other),
             "seconds": seconds,
         }
         rows += [Measurement(part, action, *pair, name, measure, value) for measure, value in values.items()]
@@ -123,9 +129,7 @@ def measure_known(take: SyntheticTake) -> list[Measurement]:
     truth = np.interp(np.arange(first, last + 1), shown, np.arange(len(samples)))
     performed = template(take.action)
     part = performed.sampled(np.arange(first, last + 1, dtype=np.float64))
-    one, other = eigenposture_coordinates(
-        *linearised_postures(take.motion, part, TEMPLATE_FPS), posture_weights(performed.skeleton)
-    )
+    one, other = eigenposture_coordinates(*weighted_postures(take.motion, part, TEMPLATE_FPS))
     return [
         Measurement(
             KNOWN, take.action, take.path, performed.name, name, "error",

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.catalog import Catalog
-from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention, canonical_indices, find_convention
-from motionary.pipeline.joint_rotations import FP_JOINTS, joint_rotations
+from motionary.pipeline.canonical import Convention
+from motionary.pipeline.joint_rotations import bone_directions, joint_rotations
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.synthetic import ACTIONS, BODIES, CONVENTIONS, STYLES
 from motionary.pipeline.synthetic.library import perform_take
@@ -32,7 +32,6 @@ RATES = (120, 60)
 EMBEDDED_TAKES = 2
 """Of each action and style."""
 
-_BONE_ENDS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}
 _WHOLE_RATE = 1 - 1e-3  # a frame time printed with few digits (0.0083333) means the whole rate
 
 
@@ -208,28 +207,8 @@ def draw_pairs(takes: Takes, draws: int, seed: int) -> dict[str, list[Pair]]:
 def read_take(takes: Takes, name: str) -> dict[int, TurningClip]:
     """Read a take as rotations at each of the rates."""
     motion = takes.motion(name)
-    directions = bone_directions(motion, takes.conventions)
+    directions = bone_directions(motion.skeleton, takes.conventions)
     return {
         rate: TurningClip(joint_rotations(motion, rate=rate, conventions=takes.conventions), directions)
         for rate in takes.rates
     }
-
-
-def bone_directions(motion: Motion, conventions: tuple[Convention, ...] = ()) -> FloatArray:
-    """Return where the bone of each of `FP_JOINTS` points at rest, in the joint's frame, of one unit (J, 3).
-
-    A limb may have joints between, such as those of a twist; at rest they are not turned.
-    """
-    skeleton = motion.skeleton
-    own = canonical_indices(skeleton, find_convention(skeleton.names, conventions))
-    joint_of = dict(zip(CANONICAL_JOINTS, own.tolist(), strict=True))
-    directions = []
-    for name in FP_JOINTS:
-        side, part = name.split("_")
-        start, joint = joint_of[name], joint_of[f"{side}_{_BONE_ENDS[part]}"]
-        reach = np.zeros(3)
-        while joint not in (start, -1):
-            reach += skeleton.offsets[joint]
-            joint = skeleton.parents[joint]
-        directions.append(reach / np.linalg.norm(reach))
-    return np.array(directions)

@@ -19,9 +19,9 @@ import pyarrow as pa
 from motionary.pipeline.alignment import Warp, uniform
 from motionary.pipeline.alignment.online import online_warp
 from motionary.pipeline.alignment.path_warp import path_warp
+from motionary.pipeline.alignment.rotation_costs import rotation_costs
 from motionary.pipeline.distances import dtw_path
 from motionary.pipeline.evaluation import joint_trajectories, kendall_tau_similarity, path_deviation
-from motionary.pipeline.motion import FloatArray
 from motionary.pipeline.tables import table_field
 from motionary.workflows.reproduce.fp_dtw_clips import TurningClip
 from motionary.workflows.reproduce.pairs import Pair
@@ -173,22 +173,3 @@ def measure_pair(
         )
         rows.append(measured(str(one), warp, perf_counter() - start))
     return rows
-
-
-def rotation_costs(moving: FloatArray, reference: FloatArray) -> FloatArray:
-    """Return how far apart the rotations of any two frames are, 2 / pi arccos |p.q| over joints [FP eq. 1].
-
-    Parameters
-    ----------
-    moving : array (m, J, 4)
-        Unit quaternions.
-    reference : array (n, J, 4)
-        Unit quaternions.
-
-    Returns
-    -------
-    array (m, n)
-        From 0, the same, to J, half a turn in every joint.
-    """
-    cosines = np.abs(np.moveaxis(moving, 1, 0) @ np.moveaxis(reference, 1, 0).swapaxes(1, 2))
-    return 2 / np.pi * np.arccos(np.minimum(cosines, 1.0)).sum(axis=0)

@@ -1,28 +1,21 @@
 """The FP-DTW experiment in a terminal, beside the paper's figures and what it concludes from them.
 
 **[FP]** Randall, Harvey, Williams, *Online alignment of human motion using forward plotting-DTW*, CAVW 34
-(2023): Tables 1 and 2, sections 5 to 7. Its Figures 5 and 6, the medians of all algorithms, are pictures;
-what the text says of them is set beside what is computed here.
+(2023): Tables 1 and 2. Its Figures 5 and 6, the medians of all algorithms, are pictures; what the text says
+of them is in `fp_dtw_claims.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import textwrap
+from collections.abc import Mapping
 
-import pandas as pd
 from rich.console import Group, RenderableType
 
+from motionary.workflows.reproduce.claims import claims_table
 from motionary.workflows.reproduce.fp_dtw import FpExperiment
-from motionary.workflows.reproduce.fp_dtw_measures import (
-    ALGORITHMS,
-    DTW,
-    IMPERCEPTIBLE,
-    MATCHING_WINDOW,
-    UTW,
-    WINDOWS,
-    Algorithm,
-    FpStudy,
-)
+from motionary.workflows.reproduce.fp_dtw_claims import IN_THE_PAPER, PASS_BOTH, claims, passing
+from motionary.workflows.reproduce.fp_dtw_measures import IMPERCEPTIBLE, UTW, WINDOWS, Algorithm, FpStudy
 from motionary.workflows.tables import text_table
 
 TABLE_1: Mapping[int, Mapping[str, float]] = {
@@ -37,17 +30,13 @@ TABLE_2: Mapping[str, float] = {
 }  # fmt: skip
 """Mean microseconds a frame, on a core of 3.58 to 3.95 GHz."""
 
-IN_THE_PAPER = [str(one) for one in ALGORITHMS if one.method != "A" or one.window == MATCHING_WINDOW]
-PASS_BOTH = ("Mc w40", "Ma + Type V", "Mc w80 + Type V")
-
 _LEGEND = (
-    "Medians over pairs. Similarity: mean over the coordinates of joint trajectories of Kendall's tau "
-    "(eq. 2), better where it is above UTW's.\n"
-    "Deviation: mean distance from DTW's path in frames of the prerecorded take (eq. 3), better where it is "
-    "under 150 ms; ahead: the same with its\n"
-    "sign, below 0 where the warp stays behind DTW (sticks), above 0 where it runs ahead (skips). Ma has a "
-    "window of 2; with wider ones it is not in the paper.\n"
-    "To Ma under Type V all windows from 3 on are one, and w10 stands for them."
+    "Medians over pairs. Similarity: mean over the coordinates of joint trajectories of Kendall's tau\n"
+    "(eq. 2), better where it is above UTW's. Deviation: mean distance from DTW's path in frames of the\n"
+    "prerecorded take (eq. 3), better where it is under 150 ms; ahead: the same with its sign, below 0\n"
+    "where the warp stays behind DTW (sticks), above 0 where it runs ahead (skips). Ma has a window of 2;\n"
+    "with wider ones it is not in the paper. To Ma under Type V all windows from 3 on are one, and w10\n"
+    "stands for them."
 )
 
 
@@ -57,30 +46,9 @@ def fp_dtw_report(experiment: FpExperiment) -> RenderableType:
     parts: list[RenderableType] = list(experiment.notes)
     for rate in study.rates:
         parts += ["", _algorithms_table(study, rate)]
-    parts += [_LEGEND, "", _claims_table(study), "", _table_1(study), "", _table_2(study)]
+    title = f"What the paper concludes, held against the medians at {study.rates[0]} frames a second"
+    parts += [_LEGEND, "", claims_table(claims(study), title), "", _table_1(study), "", _table_2(study)]
     return Group(*parts)
-
-
-def passing(study: FpStudy, rate: int) -> pd.DataFrame:
-    """Tell which algorithms pass the paper's marks: a row each, columns `similarity` and `deviation`."""
-    medians = study.medians(rate)
-    passed = {
-        "similarity": medians["similarity"] > medians.loc[UTW, "similarity"],
-        "deviation": medians["deviation"] < IMPERCEPTIBLE * rate,
-    }
-    return pd.DataFrame(passed).drop(index=[UTW, DTW])
-
-
-def improved(study: FpStudy, rate: int) -> list[str]:
-    """List the algorithms that Type V brings nearer to the target and to DTW, both."""
-    medians = study.medians(rate)
-    similarity, deviation = medians["similarity"].to_dict(), medians["deviation"].to_dict()
-    pairs = [(str(one._replace(type_v=False)), str(one)) for one in ALGORITHMS if one.type_v]
-    return [
-        free
-        for free, bound in pairs
-        if similarity[bound] > similarity[free] and deviation[bound] < deviation[free]
-    ]
 
 
 def _algorithms_table(study: FpStudy, rate: int) -> RenderableType:
@@ -114,31 +82,6 @@ def _paper_says(name: str, rate: int) -> str:
     return _yes(name in PASS_BOTH) if rate == max(TABLE_1) and name in IN_THE_PAPER else ""
 
 
-def _claims_table(study: FpStudy) -> RenderableType:
-    rate = study.rates[0]
-    medians, passed = study.medians(rate), passing(study, rate)
-    passed = passed.loc[[name for name in IN_THE_PAPER if name in passed.index]]
-    free = passed[~passed.index.str.contains("Type V")]
-    better = improved(study, rate)
-    of_a_b = [name for name in IN_THE_PAPER if name[:2] in ("Ma", "Mb") and "Type" not in name]
-    ahead = medians["ahead"]
-    online = medians.loc[passed.index, "similarity"]
-    rows = [
-        ["passes one mark, unconstrained", "Mc w40", _names(free.index[free.any(axis=1)])],
-        ["passes both marks", _names(PASS_BOTH), _names(passed.index[passed.all(axis=1)])],
-        ["best window of C at 120 a second", "w40", _best_window(study, 120)],
-        ["best window of C at 60 a second", "w20", _best_window(study, 60)],
-        ["B improves with its window", "yes", _yes(_improves_with_window(medians, "B"))],
-        ["Type V improves all of A and B", "yes", _all_but(of_a_b, better)],
-        ["Type V improves of C", "Mc w80", _names(name for name in better if name.startswith("Mc"))],
-        ["stick (below 0)", "Mb w10, Mb w80, Mc w10", _leaning(ahead, ("Mb w10", "Mb w80", "Mc w10"))],
-        ["skips (above 0)", "Mc w80", _leaning(ahead, ("Mc w80",))],
-        ["DTW is above all online", "expected", _yes(medians.loc[DTW, "similarity"] > online.max())],
-    ]  # fmt: skip
-    title = f"What the paper concludes, and what is found here at {rate} frames a second"
-    return text_table(["claim", "paper", "here"], rows, title)
-
-
 def _table_1(study: FpStudy) -> RenderableType:
     rows = []
     for rate, paper in TABLE_1.items():
@@ -161,39 +104,9 @@ def _table_2(study: FpStudy) -> RenderableType:
         rows.append([f"Method {method}", *cells])
     headings = [heading for window in WINDOWS for heading in (f"w{window}", "paper")]
     late = [str(name) for name in took.index[took >= 1e6 / rate]]
-    title = (
-        f"Mean microseconds a live frame at {rate} a second, without a constraint (Table 2). "
-        f"Slower than the {1e6 / rate:.0f} that a frame lasts: {_names(late)}"
-    )
-    return text_table(["", *headings], rows, title)
-
-
-def _best_window(study: FpStudy, rate: int) -> str:
-    if rate not in study.rates:
-        return "not tested"
-    names = [f"Mc w{window}" for window in WINDOWS]
-    return str(study.medians(rate).loc[names, "similarity"].idxmax()).removeprefix("Mc ")
-
-
-def _improves_with_window(medians: pd.DataFrame, method: str) -> bool:
-    """Tell whether every wider window is at least as near to the target and to DTW as the one before."""
-    some = medians.loc[[f"M{method.lower()} w{window}" for window in WINDOWS]]
-    nearer = some["similarity"].is_monotonic_increasing and some["deviation"].is_monotonic_decreasing
-    return bool(nearer)
-
-
-def _all_but(names: Iterable[str], better: Iterable[str]) -> str:
-    missing = [name for name in names if name not in set(better)]
-    return f"no: not {_names(missing)}" if missing else "yes"
-
-
-def _leaning(ahead: pd.Series, names: Iterable[str]) -> str:
-    """Say of algorithms how far ahead of DTW they are, in the median."""
-    return ", ".join(f"{name} {ahead[name]:+.1f}" for name in names)
-
-
-def _names(names: Iterable[str]) -> str:
-    return ", ".join(map(str, names)) or "none"
+    title = f"Mean microseconds a live frame at {rate} a second, without a constraint (Table 2)."
+    slower = f"Slower than the {1e6 / rate:.0f} that a frame lasts: {', '.join(late) or 'none'}"
+    return text_table(["", *headings], rows, f"{title}\n{textwrap.fill(slower, 110)}")
 
 
 def _yes(value: object) -> str:

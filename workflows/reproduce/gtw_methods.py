@@ -24,8 +24,8 @@ from motionary.pipeline.alignment.procrustes import (
     procrustes_derivative_dtw,
     procrustes_dtw,
     procrustes_motion_warping,
-    uniform_path,
 )
+from motionary.pipeline.alignment.steps_to_mean import uniform_path
 from motionary.pipeline.alignment.windows import Itakura, SakoeChiba, Window
 from motionary.pipeline.motion import FloatArray
 from motionary.workflows.reproduce.gtw_sequences import ANYWHERE, LATENT_FRAMES, STRETCHES

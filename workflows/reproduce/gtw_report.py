@@ -9,9 +9,9 @@ from __future__ import annotations
 import pandas as pd
 from rich.console import Group, RenderableType
 
+from motionary.workflows.reproduce.claims import claims_table
 from motionary.workflows.reproduce.gtw import GtwExperiment, GtwStudy
 from motionary.workflows.reproduce.gtw_claims import (
-    Claim,
     error_claims,
     growth,
     median_seconds,
@@ -46,10 +46,10 @@ def gtw_report(experiment: GtwExperiment) -> RenderableType:
     ]
     for columns in SET_METHODS:
         parts += ["", _sets_table(study, columns)]
-    parts += [_LEGEND, "", *_said("5.2 (Figure 4g)", set_claims(study))]
+    parts += [_LEGEND, "", claims_table(set_claims(study), _said_of("5.2 (Figure 4g)"))]
     parts += ["", _errors_table(study), "", _seconds_table(study), ""]
-    parts += _said("4.3 (Figures 3c and 3d)", [*error_claims(study), *time_claims(study)])
-    return Group(*parts)
+    claims = [*error_claims(study), *time_claims(study)]
+    return Group(*parts, claims_table(claims, _said_of("4.3 (Figures 3a, 3c and 3d)")))
 
 
 def _sets_table(study: GtwStudy, columns: str) -> RenderableType:
@@ -93,9 +93,5 @@ def _rows(table: pd.DataFrame, digits: int) -> list[list[str]]:
     ]
 
 
-def _said(part: str, claims: list[Claim]) -> list[RenderableType]:
-    lines: list[RenderableType] = [f"What the paper says of {part}, which has no numbers in its text:"]
-    for claim in claims:
-        verdict = "It holds here" if claim.holds else "It does NOT hold here"
-        lines += [f"- {claim.paper}.", f"  {verdict}: {claim.here}."]
-    return lines
+def _said_of(part: str) -> str:
+    return f"What the paper says of {part}, which has no numbers in its text:"
