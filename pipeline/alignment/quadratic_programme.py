@@ -13,7 +13,6 @@ from scipy.sparse import csc_matrix
 from motionary.pipeline.motion import FloatArray
 
 
-
 class UnsolvedError(ArithmeticError):
     """The solver ended without a solution; says with which status."""
 
