@@ -36,7 +36,7 @@ from motionary.workflows.reproduce.adaptive_dtw_measures import (
 from motionary.workflows.reproduce.cotw_measures import Measurement, Measurements, known_takes
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.labelled import LabelledClips, labelled_clips
-from motionary.workflows.reproduce.pairs import MOST_ACTIONS, MOST_CLIPS, Pair
+from motionary.workflows.reproduce.pairs import MOST_ACTIONS, Pair, comparable_by_action
 
 Group = tuple[str, frozenset[str]]
 """An action, and the names of the joints of those of its clips that can be compared with each other."""
@@ -134,13 +134,7 @@ def comparable_pairs(library: Library, draws: int, seed: int) -> dict[str, list[
     """
     clips = library.clips
     who = dict(zip(clips.clip_ids, clips.classes if clips.subjects is None else clips.subjects, strict=True))
-    possible: dict[str, list[Pair]] = {}
-    for place, ((action, _), ids) in enumerate(_comparable(library).items()):
-        some = np.random.default_rng([seed, place]).permutation(len(ids))[:MOST_CLIPS]
-        chosen = [ids[one] for one in np.sort(some)]
-        possible.setdefault(action, []).extend(
-            (one, other) for one in chosen for other in chosen if one != other
-        )
+    possible = comparable_by_action(_comparable(library), seed)
     drawn = {}
     for place in np.sort(np.random.default_rng(seed).permutation(len(possible))[:MOST_ACTIONS]).tolist():
         action, pairs = list(possible.items())[place]

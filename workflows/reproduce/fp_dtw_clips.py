@@ -24,7 +24,7 @@ from motionary.pipeline.synthetic.library import perform_take
 from motionary.pipeline.synthetic.styles import personal
 from motionary.workflows.errors import UserError
 from motionary.workflows.reproduce.labelled import labelled_clips
-from motionary.workflows.reproduce.pairs import MOST_CLIPS, Pair
+from motionary.workflows.reproduce.pairs import Pair, comparable_by_action
 
 RATES = (120, 60)
 """Frames a second, the paper's, the highest first."""
@@ -191,12 +191,7 @@ def draw_pairs(takes: Takes, draws: int, seed: int) -> dict[str, list[Pair]]:
     dict of str to list of Pair
         By action the names of the moving take and of the reference.
     """
-    possible: dict[str, list[Pair]] = {}
-    for place, ((action, _), ids) in enumerate(takes.groups.items()):
-        some = np.random.default_rng([seed, place]).permutation(len(ids))[:MOST_CLIPS]
-        chosen = [ids[one] for one in np.sort(some)]
-        pairs = [(one, other) for one in chosen for other in chosen if one != other]
-        possible.setdefault(action, []).extend(pairs)
+    possible = comparable_by_action(takes.groups, seed)
     drawn = {}
     for place, (action, pairs) in enumerate(possible.items()):
         order = np.random.default_rng([seed, place]).permutation(len(pairs))[:draws]

@@ -7,8 +7,9 @@ else of any two clips.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,30 @@ def draw_actions(clips: LabelledClips, draws: int, seed: int) -> list[Action]:
     known = () if clips.subjects is None else (TWO_PEOPLE, ONE_PERSON)
     kinds = [kind for kind in known if sum(bool(action.pairs[kind]) for action in actions) > 1] or [ANYONE]
     return [replace(action, pairs={kind: action.pairs[kind] for kind in kinds}) for action in actions]
+
+
+def comparable_by_action(groups: Mapping[Any, Sequence[str]], seed: int) -> dict[str, list[Pair]]:
+    """List the ordered pairs of clips that can be compared.
+
+    Parameters
+    ----------
+    groups : mapping of (action, what must be the same) to sequence of str
+        Names of clips; of more than 200 in a group, 200 are drawn first.
+    seed : int
+        Of NumPy's PCG64.
+
+    Returns
+    -------
+    dict of str to list of Pair
+        By action.
+    """
+    possible: dict[str, list[Pair]] = {}
+    for place, ((action, _), ids) in enumerate(groups.items()):
+        some = np.sort(np.random.default_rng([seed, place]).permutation(len(ids))[:MOST_CLIPS])
+        chosen = [ids[one] for one in some]
+        pairs = [(one, other) for one in chosen for other in chosen if one != other]
+        possible.setdefault(action, []).extend(pairs)
+    return possible
 
 
 def _draw_action(clips: LabelledClips, name: str, draws: int, seed: list[int]) -> Action:
