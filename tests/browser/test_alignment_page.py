@@ -40,10 +40,11 @@ def opened(page, made):
 
 
 def test_names_are_shown_as_they_are(opened):
-    for name in HOSTILE:
+    short = [name.split("/")[-1] for name in HOSTILE]
+    for name in short:
         assert opened.locator("h1 bdi, .quiet bdi", has_text=name).count() == 1
-        assert opened.locator(".player .name, .player bdi", has_text=name.split("/")[-1]).count()
-    assert opened.title() == f"{HOSTILE[0]} in the time of {HOSTILE[1]}"
+        assert opened.locator(".player .name, .player bdi", has_text=name).count()
+    assert opened.title() == f"{short[0]} in the time of {short[1]}"
     texts = [
         text.replace("\u2068", "").replace("\u2069", "") for text in opened.evaluate(TEXTS, "warps-chart")
     ]
