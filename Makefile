@@ -13,7 +13,7 @@ SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typ
 	-o -name '*.js' -o -name '*.css' -o -name '*.html' -o -name '*.svg')
 PAGES := $(shell find README.md pipeline catalog workflows notebooks tests -name '*.md' -o -name '*.ipynb' -o -path '*/static/*')
 
-.PHONY: help demo test test-all bench bench-alignment bench-ask torture docs lint clean
+.PHONY: help demo test test-all bench bench-alignment bench-ask scale torture docs lint clean
 
 help:
 	@echo "make demo      run the main job on the embedded library and show the result"
@@ -21,6 +21,7 @@ help:
 	@echo "make test-all  run all tests"
 	@echo "make bench     time the distances beside dtaidistance, aeon and tslearn, then the alignment,"
 	@echo "               then questions to catalogs of up to 10,000 clips"
+	@echo "make scale     run libraries of 300 to 10,000 clips; what each takes, and a model of 142,000"
 	@echo "make torture   damage files, kill runs, fill disks, read while runs publish; an hour or more"
 	@echo "make docs      build the documentation site, with the notebooks run; some minutes"
 	@echo "make lint      check style, types and the direction of imports"
@@ -50,6 +51,10 @@ bench-alignment: $(VENV)/installed
 bench-ask: $(VENV)/installed
 	@echo "== Questions to catalogs of 300 to 10,000 embedded clips; making them takes half an hour, the first time"
 	$(BIN)/python -m tests.benchmarks.ask --json motionary-bench/ask.json
+
+scale: $(VENV)/installed
+	@echo "== Libraries of 300, 1,000, 3,000 and 10,000 embedded clips, run and measured: an hour or more"
+	$(BIN)/python -m tests.benchmarks.scale --json motionary-bench/scale.json
 
 torture: $(VENV)/installed
 	@echo "== Damaged files, killed runs, readers under writing, full disks: an hour or more"

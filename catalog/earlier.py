@@ -29,17 +29,15 @@ def earlier_run(store: Store, snapshot: Snapshot | None, inputs: pa.Table) -> Ea
     if snapshot is None or not len(inputs):
         return Earlier()
     quarantine = store.read(snapshot.tables["quarantine"])
-    batches: dict[int, dict[str, str]] = {}
-    for row in inputs.select(["clip_id", "key", "batch"]).to_pylist():
-        batches.setdefault(row["batch"], {})[row["clip_id"]] = row["key"]
     return Earlier(
         snapshot_id=snapshot.snapshot_id,
-        batches=[batches[number] for number in sorted(batches)],
+        batches=_groups(inputs, "batch"),
+        sides=_groups(inputs, side_column(inputs)),
         digests=dict(zip(inputs["clip_id"].to_pylist(), inputs["digest"].to_pylist(), strict=True)),
         retry=frozenset(quarantine.filter(quarantine["retry"])["path"].to_pylist()),
         results={stage: _keys(snapshot.tables.get(makes[0], ())) for stage, makes in MAKES.items()},
         settings=snapshot.stages,
-        batch_size=_batch_size(store, snapshot),
+        side=_side(store, snapshot),
     )
 
 
@@ -82,15 +80,29 @@ def inputs_table(layout: Layout) -> pa.Table:
             "files": [vars(_storable(state)) for state in clip.source.states],
             "digest": clip.source.digest,
             "key": clip.key,
-            "batch": number,
+            "batch": batch,
+            "side": side,
         }
-        for number, batch in enumerate(layout.batches)
-        for clip in batch
+        for side, batches in enumerate(layout.batches_of_side)
+        for batch in batches
+        for clip in layout.batches[batch]
     ]
     return pa.Table.from_pylist(rows, schema=SCHEMAS["inputs"])
 
 
-def _batch_size(store: Store, snapshot: Snapshot) -> int:
+def side_column(inputs: pa.Table) -> str:
+    """Say which column of `inputs` tells the sides of tiles: once every batch was one."""
+    return "side" if "side" in inputs.column_names and not inputs["side"].null_count else "batch"
+
+
+def _groups(inputs: pa.Table, column: str) -> list[dict[str, str]]:
+    groups: dict[int, dict[str, str]] = {}
+    for row in inputs.select(["clip_id", "key", column]).to_pylist():
+        groups.setdefault(row[column], {})[row["clip_id"]] = row["key"]
+    return [groups[number] for number in sorted(groups)]
+
+
+def _side(store: Store, snapshot: Snapshot) -> int:
     settings = store.read(snapshot.tables["runs"])["settings"][-1].as_py()
     return int(json.loads(settings)["distances"]["tile"])
 

@@ -23,12 +23,17 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from scipy.special import gammaincc
 
-from motionary.catalog.own_pairs import batch_count, pairs_with_batch
-from motionary.catalog.places import batch_of
+from motionary.catalog.own_pairs import (
+    pairs_with_side,
+    refuse_without_all_pairs,
+    side_count,
+    side_of,
+    sides_to_read,
+)
 from motionary.catalog.query import Catalog
 from motionary.catalog.ranked_distance import RankedDistance
 
-_BATCHES = 16
+_PAIRS = 5_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,7 @@ class UsualDistances:
 
 
 def usual_distances(catalog: Catalog, clip_ids: pa.Array, distance: RankedDistance) -> UsualDistances:
-    """Read what distances every clip has to the clips of some batches, kept while the catalog is open.
+    """Read what distances every clip has to the clips of some sides of tiles, kept while the catalog is open.
 
     Parameters
     ----------
@@ -61,8 +66,15 @@ def usual_distances(catalog: Catalog, clip_ids: pa.Array, distance: RankedDistan
     Returns
     -------
     UsualDistances
-        To the clips of all batches, or of 16 evenly spread: of 10,000 clips some 500.
+        To all clips, or to those of some sides evenly spread, five million distances: of 10,000 clips, to
+        some 500.
+
+    Raises
+    ------
+    CatalogError
+        The run did not compare all pairs; or a file is damaged.
     """
+    refuse_without_all_pairs(catalog, "mutual proximity")
     return catalog.keep(f"usual distances {distance}", lambda: _read(catalog, clip_ids, distance))
 
 
@@ -97,14 +109,15 @@ def _further(
 
 
 def _read(catalog: Catalog, clip_ids: pa.Array, distance: RankedDistance) -> UsualDistances:
-    batches = np.unique(np.linspace(0, batch_count(catalog) - 1, _BATCHES).round().astype(np.int64))
-    batch = batch_of(catalog)
-    here = np.array([batch[one] for one in clip_ids.to_pylist()])
-    chosen = np.isin(here, batches)
+    most = sides_to_read(catalog, _PAIRS)
+    sides = np.unique(np.linspace(0, side_count(catalog) - 1, most).round().astype(np.int64))
+    side = side_of(catalog)
+    here = np.array([side[one] for one in clip_ids.to_pylist()])
+    chosen = np.isin(here, sides)
     asked, values = [], []
-    for number in batches:
-        pairs = pairs_with_batch(catalog, int(number), distance.columns)
-        a, b = (pc.index_in(pairs[side], clip_ids).to_numpy() for side in ("clip_a", "clip_b"))
+    for number in sides:
+        pairs = pairs_with_side(catalog, int(number), distance.columns)
+        a, b = (pc.index_in(pairs[end], clip_ids).to_numpy() for end in ("clip_a", "clip_b"))
         found = distance.of(pairs).astype(np.float64)
         for clip, other in ((a, b), (b, a)):
             counts = here[other] == number

@@ -1,7 +1,8 @@
 """The clips of a catalog that are most like one of them, or like a file.
 
 A clip's distances to all others stand in table `pairs`, and are read; a file is compared with all clips,
-exactly, most of them ruled out by bounds (`motionary.pipeline.distances.nearest`). Both give one answer: a
+exactly, most of them ruled out by bounds (`motionary.pipeline.distances.nearest`), and so is a clip where the
+run did not compare all pairs. Both give one answer: a
 file of the library finds its own clip at distance 0 and the others as that clip does. Over some joints alone
 nothing is stored, and clips are compared as files are.
 """
@@ -22,7 +23,7 @@ from motionary.catalog.errors import CatalogError
 from motionary.catalog.example import ClipOrFile, Example, clip_seconds, example_of, library_features
 from motionary.catalog.joint_columns import JointColumns, joint_columns
 from motionary.catalog.mutual import mutual_proximity, usual_distances
-from motionary.catalog.own_pairs import own_pairs
+from motionary.catalog.own_pairs import all_pairs_are_there, own_pairs
 from motionary.catalog.query import Catalog
 from motionary.catalog.ranked_distance import RankedDistance, ranked_distance
 from motionary.pipeline.config import Metric
@@ -213,7 +214,7 @@ def _distances(
     """Find at least the k nearest clips."""
     clip_ids = _takes(catalog)["clip_id"].combine_chunks()
     name = None if isinstance(clip_or_file, Example) else os.fspath(clip_or_file)
-    if joints is None and name in clip_seconds(catalog):
+    if joints is None and name in clip_seconds(catalog) and all_pairs_are_there(catalog):
         return _stored(catalog, name, clip_ids, distance)
     from motionary.pipeline.distances.nearest import nearest_clips
 

@@ -32,6 +32,7 @@ SCHEMAS: dict[str, pa.Schema] = {
             table_field("digest", pa.string(), "BLAKE2b of their bytes; empty where they cannot be read"),
             table_field("key", pa.string(), "digest of the bytes and of all that reading them depends on"),
             table_field("batch", pa.int32(), "clips that are stored together, from 0"),
+            table_field("side", pa.int32(), "clips that are compared together, the side of a tile, from 0"),
         ]
     ),
     "runs": pa.schema(

@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from uuid import uuid4
 
 import fsspec
@@ -30,6 +30,8 @@ from fsspec.implementations.local import LocalFileSystem
 from motionary.catalog.errors import CatalogError
 from motionary.catalog.schema import conform
 from motionary.pipeline.layout import digest_of_settings
+
+Content: TypeAlias = "bytes | pa.Buffer"
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,7 @@ class Store:
         """
         facts = {}
         for name, table in tables.items():
-            sink = pa.BufferOutputStream()
-            pq.write_table(conform(name, table), sink, compression="zstd")
-            content = sink.getvalue().to_pybytes()
+            content = _parquet(conform(name, table))
             self.write(self.part_name(name, key), content)
             facts[name] = _facts(content, table.num_rows)
         return facts
@@ -161,6 +161,13 @@ class Store:
         """
         content = self.read_bytes(file)
         return _facts(content, pq.read_metadata(pa.BufferReader(content)).num_rows)
+
+    def stored(self, key: str, tables: Iterable[str]) -> dict[str, PartFacts] | None:
+        """Return what a result's parts are known by; None where one is missing or no whole Parquet file."""
+        try:
+            return {table: self.facts(self.part_name(table, key)) for table in tables}
+        except (OSError, ValueError):  # pyarrow says so of a damaged file
+            return None
 
     def load(self, key: str, table: str, columns: Sequence[str] | None = None) -> pa.Table:
         """Read one part, or some columns of it with their text as dictionaries, which take less memory."""
@@ -200,12 +207,12 @@ class Store:
         filesystem = self.filesystem
         return sum(pq.read_metadata(self.path(file), filesystem=filesystem).num_rows for file in files)
 
-    def write(self, name: str, content: bytes) -> None:
+    def write(self, name: str, content: Content) -> None:
         """Put a file in place in one step: never half of it, whatever happens meanwhile."""
         filesystem, path = self.filesystem, self.path(name)
         if not isinstance(filesystem, LocalFileSystem):
             filesystem.makedirs(posixpath.dirname(path), exist_ok=True)
-            filesystem.pipe_file(path, content)
+            filesystem.pipe_file(path, bytes(content))
             return
         temporary = Path(f"{path}.{uuid4().hex}.tmp")
         try:
@@ -316,11 +323,23 @@ class Store:
         return self.filesystem.cat_file(self.path(name))
 
 
+def _parquet(table: pa.Table) -> pa.Buffer:
+    """Write a table as a Parquet file; numbers that hardly repeat take two thirds without a dictionary."""
+    repeating = [
+        one.name
+        for one in table.schema
+        if not pa.types.is_nested(one.type) and not pa.types.is_floating(one.type)
+    ]
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", use_dictionary=repeating)
+    return sink.getvalue()
+
+
 def _writes_on_condition(filesystem: Any) -> bool:
     return "s3" in filesystem.protocol
 
 
-def _facts(content: bytes, rows: int) -> PartFacts:
+def _facts(content: Content, rows: int) -> PartFacts:
     return PartFacts(rows, len(content), hashlib.blake2b(content, digest_size=16).hexdigest())
 
 

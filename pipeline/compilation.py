@@ -120,10 +120,13 @@ def _call_every_kernel() -> None:
     """Call what commands call, with their types: features float32, rotations and distances float64."""
     from motionary.pipeline.alignment import cotw, cotw_search
     from motionary.pipeline.alignment.registry import ALIGNERS
-    from motionary.pipeline.clustering import complete_linkage, fuzzy_linkage
+    from motionary.pipeline.clustering import complete_linkage, nearest_neighbour_graph, ward_linkage
+    from motionary.pipeline.clustering.condensed_kernels import first_repeated
+    from motionary.pipeline.clustering.sparse_linkage import complete_linkage_under
     from motionary.pipeline.distances import compare_clips, pairwise_distances
     from motionary.pipeline.distances.explain import explain_pair, feature_parts
     from motionary.pipeline.distances.nearest import nearest_clips, pack_library
+    from motionary.pipeline.distances.pruned import pairwise_under
     from motionary.pipeline.distances.subsequence import find_occurrences, pack_takes
 
     random = np.random.default_rng(0)
@@ -133,20 +136,25 @@ def _call_every_kernel() -> None:
     nearest_clips(clips[0], pack_library(clips))
     explain_pair(clips[0], clips[1], feature_parts("pose+travel"))
     find_occurrences(clips[0], pack_takes(clips), 1)
-    complete_linkage(pairs.weighted)
-    fuzzy_linkage(pairs.fuzzy_low, pairs.fuzzy_high)
+    pairwise_under(clips, mu=1.0)
+    complete_linkage_under(3, np.array([0, 0]), np.array([1, 2]), pairs.weighted[:2].astype(np.float32))
+    for values in (pairs.weighted, pairs.weighted.astype(np.float32)):
+        complete_linkage(values)
+        nearest_neighbour_graph(values)
+    ward_linkage(pairs.weighted)
+    first_repeated(np.zeros(1, np.uint8), np.zeros(1, np.int64))
     cotw(clips[0], clips[1], segment_length=5, slack=1)
     # Long enough for a coarse version and its refinement.
     moving, reference = (random.random((frames, 59), dtype=np.float32) for frames in (30, 100))
     cotw_search(moving, reference, effort="fast")
     quaternions = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (9, 2, 4))
-    values: dict[str, NDArray[Any]] = {
+    read: dict[str, NDArray[Any]] = {
         "features": clips[0],
         "postures": clips[0].astype(np.float64),
         "rotations": quaternions,
     }
     for aligner in ALIGNERS.values():
-        aligner.align(values[aligner.reads], values[aligner.reads])
+        aligner.align(read[aligner.reads], read[aligner.reads])
 
 
 @cache

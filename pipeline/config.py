@@ -17,6 +17,7 @@ FeatureKind = Literal["pose+travel", "paper"]
 Metric = Literal["dtw", "b_dtw", "weighted", "fuzzy"]
 Effort = Literal["fast", "full"]
 Spacing = Literal["equal", "boundaries"]
+ComparedPairs = Literal["all", "pruned"]
 LinkageMethod = Literal["complete", "ward", "average", "fuzzy"]
 
 
@@ -92,19 +93,25 @@ class DistanceConfig:
         1 is always the eighth.
     seed : int
         Of the draw, under "random".
-    tile : int
-        Clips a side of a tile of pairs, about, and of a batch that is read together; 32 by default. The
-        results do not depend on it.
+    tile : int, optional
+        Clips a side of a tile of pairs, about; by default as many as the library's size makes fit, see
+        `motionary.pipeline.layout.side_for`. The results do not depend on it.
+    pairs : {"all", "pruned"}
+        Every pair is compared; or those alone whose weighted distance may be at most mu, which give the same
+        clusters as all where complete linkage is cut there, see `motionary.pipeline.distances.pruned`.
     """
 
     thresholds: Literal["midpoints", "random"] = "midpoints"
     seed: int = 0
-    tile: int = 32
+    tile: int | None = None
+    pairs: ComparedPairs = "all"
 
     def __post_init__(self) -> None:
+        _one_of("pairs", self.pairs, ("all", "pruned"))
         _one_of("thresholds", self.thresholds, ("midpoints", "random"))
         _at_least("seed", self.seed, 0)
-        _at_least("tile", self.tile, 1)
+        if self.tile is not None:
+            _at_least("tile", self.tile, 1)
 
 
 @dataclass(frozen=True)
@@ -233,6 +240,24 @@ class PipelineConfig:
     distances: DistanceConfig = field(default_factory=DistanceConfig)
     clusters: ClusterConfig = field(default_factory=ClusterConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+
+    def __post_init__(self) -> None:
+        clusters = self.clusters
+        cut_by_mu = (clusters.primary, clusters.metric) == (
+            "complete",
+            "weighted",
+        ) and clusters.threshold is not None
+        if self.distances.pairs == "pruned" and not cut_by_mu:
+            raise ValueError(
+                "pairs are pruned where complete linkage on the weighted distance is cut at a threshold, and "
+                f"here primary is {clusters.primary!r}, metric {clusters.metric!r} and threshold "
+                f"{clusters.threshold}; set the three, or compare all pairs"
+            )
+
+    @property
+    def most_distance(self) -> float | None:
+        """The weighted distance beyond which pairs are not compared, mu; None where all are."""
+        return self.clusters.threshold if self.distances.pairs == "pruned" else None
 
 
 def config_of(settings: Mapping[str, Mapping[str, Any]]) -> PipelineConfig:

@@ -1,6 +1,6 @@
 """The Dask graph: which stage feeds which. Wiring, no mathematics.
 
-    files -> ingest (a batch) -> resample -> compare (two batches) -> cluster -> identify
+    files -> ingest (a batch) -> resample -> compare (two sides) -> cluster -> identify
              identify -> represent
              represent -> align (a batch) -> style
              represent -> name
@@ -16,7 +16,7 @@ caller gives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -34,6 +34,7 @@ from motionary.pipeline.stage_settings import stage_settings
 from motionary.pipeline.stages import (
     align,
     cluster,
+    cluster_pruned,
     compare,
     identify,
     ingest,
@@ -42,15 +43,34 @@ from motionary.pipeline.stages import (
     resample,
     style,
 )
-from motionary.pipeline.task import MAKES, IsStored, TableStore, Task, run_task
+from motionary.pipeline.task import MAKES, IsStored, TableStore, Task, TaskReport, run_task
+
+ROOM = 1 << 30
+"""Bytes that a task may hold, unless the caller says otherwise."""
 
 
-def dask_graph(tasks: Iterable[Task], store: TableStore) -> dict[str, DaskTask]:
-    """Write tasks as Dask wants them; each computes to its `TaskReport`."""
-    names = {task.key: f"{task.stage}-{task.key}" for task in tasks}
+def dask_graph(
+    tasks: Iterable[Task],
+    store: TableStore,
+    run: Callable[[Task, TableStore, Sequence[TaskReport]], TaskReport] = run_task,
+    suffix: str = "",
+) -> dict[str, DaskTask]:
+    """Write tasks as Dask wants them; each computes to its `TaskReport`.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+    store : TableStore
+        Where results are.
+    run : callable
+        What runs one.
+    suffix : str
+        Ends their names: a scheduler takes tasks of one name for one, be they for two stores or not.
+    """
+    names = {task.key: f"{task.stage}-{task.key}{suffix}" for task in tasks}
     return {
         names[task.key]: DaskTask(
-            names[task.key], run_task, task, store,
+            names[task.key], run, task, store,
             List(*(TaskRef(names[key]) for key in task.after if key in names)),
         )
         for task in tasks
@@ -75,6 +95,8 @@ class LibraryGraph:
         The run to build upon.
     is_stored : callable
         Asked for the results of that run.
+    room : int
+        Bytes that a task may hold of what would not fit into memory whole; changes no result.
     """
 
     layout: Layout
@@ -83,6 +105,7 @@ class LibraryGraph:
     config: PipelineConfig
     earlier: Earlier
     is_stored: IsStored
+    room: int = ROOM
 
     @cached_property
     def settings(self) -> dict[str, str]:
@@ -127,15 +150,18 @@ class LibraryGraph:
 
     @cached_property
     def compared(self) -> list[Task]:
-        """Every tile of two batches, or of one, compared."""
-        tiles = [*combinations_with_replacement(range(len(self.layout.batches)), 2)]
-        contents = [[(clip.clip_id, clip.key) for clip in batch] for batch in self.layout.batches]
-        keys = {tile: self._key("compare", [contents[batch] for batch in tile]) for tile in tiles}
+        """Every tile of two sides, or of one, compared."""
+        tiles = [*combinations_with_replacement(range(len(self.layout.sides)), 2)]
+        contents = [
+            digest_of_settings([(clip.clip_id, clip.key) for clip in side]) for side in self.layout.sides
+        ]
+        keys = {tile: self._key("compare", [contents[side] for side in tile]) for tile in tiles}
+        frames = [[self.resampled[batch].key for batch in batches] for batches in self.layout.batches_of_side]
         return [
             Task(
                 "compare", keys[tile], compare.compare,
-                reads=[("resampled", [self.resampled[batch].key]) for batch in tile],
-                arguments=(self.config.distances,),
+                reads=[("resampled", frames[side]) for side in tile],
+                arguments=(self.config.distances, self.config.most_distance),
                 carries=self._carried_pairs(tile, keys),
             )
             for tile in tiles
@@ -146,9 +172,12 @@ class LibraryGraph:
         """The library clustered."""
         ingested = [task.key for task in self.ingested]
         about = (ingested, self.labels.to_pylist(), self._named)
+        all_pairs = self.config.most_distance is None
         return Task(
-            "cluster", self._key("cluster", about), cluster.cluster,
-            reads=[("ingested", ingested), ("pairs", [task.key for task in self.compared])],
+            "cluster", self._key("cluster", about),
+            cluster.cluster if all_pairs else cluster_pruned.cluster_pruned,
+            reads=[("ingested", ingested)],
+            streams=[("pairs", [task.key for task in self.compared])],
             arguments=(self.labels, self.overrides, self.config.clusters),
         )  # fmt: skip
 
@@ -197,11 +226,11 @@ class LibraryGraph:
         return Task(
             "represent", self._key("represent", about), represent.represent,
             reads=[
-                ("members", [self.identified.key]), ("pairs", [task.key for task in self.compared]),
-                ("ingested", batches), ("features", batches),
+                ("members", [self.identified.key]), ("ingested", batches),
                 ("centres", _list(before)), ("reference_features", _list(before)),
             ],
-            arguments=(kept, self.config.clusters, self.config.alignment),
+            streams=[("pairs", [task.key for task in self.compared]), ("features", batches)],
+            arguments=(kept, self.config.clusters, self.config.alignment, self.room),
         )  # fmt: skip
 
     def alignment(self, represented: Task, references: pa.Table, earlier: pa.Table) -> list[Task]:
@@ -253,13 +282,12 @@ class LibraryGraph:
         ]
         return Task(
             "style", self._key("style", [*about.values()]), style.style,
-            reads=[
-                ("represented", [represented.key]),
+            reads=[("represented", [represented.key]), ("styles", _list(before))],
+            streams=[
                 ("ingested", [self.ingested[number].key for number in batches]),
                 ("aligned", [aligned[number].key for number in batches]),
-                ("styles", _list(before)),
             ],
-            arguments=(kept, self.config.features.conventions, self.config.features.frame_rate),
+            arguments=(kept, self.config.features.conventions, self.config.features.frame_rate, self.room),
         )  # fmt: skip
 
     def naming(self, represented: str) -> Task:
@@ -290,8 +318,8 @@ class LibraryGraph:
         found = []
         for block in pair_origins(tile, self.layout, self.earlier):
             if not block.origin.earlier:
-                found.append((keys[block.origin.batches], block))
-            elif alike and (key := self._earlier("compare", self.earlier.tile(*block.origin.batches))):
+                found.append((keys[block.origin.sides], block))
+            elif alike and (key := self._earlier("compare", self.earlier.tile(*block.origin.sides))):
                 found.append((key, block))
         return found
 

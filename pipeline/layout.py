@@ -1,10 +1,14 @@
-"""A library laid out in batches, and where each of its contents can be had without computing it again.
+"""A library laid out for the work, and where each of its contents can be had without computing it again.
 
 A clip's *key* is a digest of its bytes and of all that reading it depends on. Equal keys mean equal contents,
 whatever the clips are called: a clip that was renamed, or that lies in the library twice, is computed once.
 
-Clips stay in the batch that they are in, so that what is stored of it stays as it is; new ones join a small
-last batch or make batches of their own. Batches that clips left are laid out anew when they have become many.
+Pairs are compared by tiles, each of two *sides*: some hundreds of clips, the more the larger the library, so
+that there are not too many tiles. A side is read and aligned in *batches*, a few dozen clips whose frames fit
+into memory together.
+
+Clips stay on the side that they are on, so that what is stored of it stays as it is; new ones join a small
+last side or make sides of their own. Sides that clips left are laid out anew when they have become many.
 """
 
 from __future__ import annotations
@@ -14,17 +18,22 @@ import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import accumulate, pairwise
+from math import isqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from motionary.pipeline.readers.amc import rate_in_name
 from motionary.pipeline.readers.library import Source
 
+BATCH = 32
+"""Clips of a batch, about; twice that at most."""
+
 
 class Place(NamedTuple):
-    """A clip of a batch."""
+    """A clip of a batch, or of a side, by its number."""
 
-    batch: int
+    number: int
     clip_id: str
 
 
@@ -36,8 +45,8 @@ class Earlier:
     ----------
     snapshot_id : str
         Empty where there is none.
-    batches : sequence of mapping
-        Of each batch, the key of every clip, readable or not, in order.
+    batches, sides : sequences of mapping
+        Of each batch or side, the key of every clip, readable or not, in order.
     digests : mapping of str to str
         Of every clip's bytes.
     retry : collection of str
@@ -46,17 +55,18 @@ class Earlier:
         Of each stage, the keys of its results, in the order of its tasks.
     settings : mapping of str to str
         Of each stage, the digest of its version and settings.
-    batch_size : int
-        What its batches were cut by.
+    side : int
+        What its sides were cut by.
     """
 
     snapshot_id: str = ""
     batches: Sequence[Mapping[str, str]] = ()
+    sides: Sequence[Mapping[str, str]] = ()
     digests: Mapping[str, str] = field(default_factory=dict)
     retry: Collection[str] = ()
     results: Mapping[str, Sequence[str]] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
-    batch_size: int = 0
+    side: int = 0
 
     @cached_property
     def keys(self) -> dict[str, str]:
@@ -65,12 +75,17 @@ class Earlier:
 
     @cached_property
     def places(self) -> dict[str, Place]:
-        """Of every key, one of the clips that have it."""
+        """Of every key, one of the clips that have it, and its batch."""
         return _first_places(self.batches)
 
+    @cached_property
+    def side_places(self) -> dict[str, Place]:
+        """Of every key, one of the clips that have it, and its side."""
+        return _first_places(self.sides)
+
     def tile(self, first: int, second: int) -> int:
-        """Return the place of a tile among the results of comparing, the first batch not after the second."""
-        return first * len(self.batches) - first * (first - 1) // 2 + second - first
+        """Return the place of a tile among the results of comparing, the first side not after the second."""
+        return first * len(self.sides) - first * (first - 1) // 2 + second - first
 
     def names_of(self, digests: Mapping[str, str]) -> dict[str, str]:
         """Say of every clip that was there what it was called: its name, or that of its bytes if renamed.
@@ -107,9 +122,31 @@ class Clip:
 
 @dataclass(frozen=True)
 class Layout:
-    """The clips of a library in batches; in each, in clip_id order."""
+    """The clips of a library by sides, and each side by batches; in each, in clip_id order.
 
-    batches: Sequence[Sequence[Clip]]
+    Parameters
+    ----------
+    cut : sequence of sequence of sequence of Clip
+        The batches of every side.
+    """
+
+    cut: Sequence[Sequence[Sequence[Clip]]]
+
+    @cached_property
+    def sides(self) -> list[list[Clip]]:
+        """The clips of every side."""
+        return [[clip for batch in side for clip in batch] for side in self.cut]
+
+    @cached_property
+    def batches(self) -> list[Sequence[Clip]]:
+        """The batches of all sides, one side after the other."""
+        return [batch for side in self.cut for batch in side]
+
+    @cached_property
+    def batches_of_side(self) -> list[range]:
+        """The numbers of every side's batches."""
+        ends = [0, *accumulate(map(len, self.cut))]
+        return [range(*two) for two in pairwise(ends)]
 
     @cached_property
     def digests(self) -> dict[str, str]:
@@ -123,15 +160,30 @@ class Layout:
 
     @cached_property
     def places(self) -> dict[str, Place]:
-        """Of every key, the first clip that has it."""
+        """Of every key, the first clip that has it, and its batch."""
         return _first_places([{clip.clip_id: clip.key for clip in batch} for batch in self.batches])
+
+    @cached_property
+    def side_places(self) -> dict[str, Place]:
+        """Of every key, the first clip that has it, and its side."""
+        return _first_places([{clip.clip_id: clip.key for clip in side} for side in self.sides])
 
     def __iter__(self) -> Iterator[Clip]:
         return (clip for batch in self.batches for clip in batch)
 
 
+def side_for(clips: int, earlier: Earlier) -> int:
+    """Choose how many clips a side has: such that the tiles are some hundreds, or a tenth of the clips.
+
+    That is 32 up to 455 clips, 256 for 10,000 and 1,024 for 142,000. The earlier run's is kept while it is
+    not off by more than a factor of two.
+    """
+    side = 1 << (max(32, isqrt(9 * clips)).bit_length() - 1)
+    return earlier.side if side <= 2 * earlier.side <= 4 * side else side
+
+
 def lay_out(sources: Sequence[Source], reading: Any, size: int, earlier: Earlier) -> Layout:
-    """Give every clip its key and its batch.
+    """Give every clip its key, its side and its batch.
 
     Parameters
     ----------
@@ -140,7 +192,7 @@ def lay_out(sources: Sequence[Source], reading: Any, size: int, earlier: Earlier
     reading : JSON value
         What the content of a clip depends on beside its files.
     size : int
-        Clips of a batch, about.
+        Clips of a side, about; see `side_for`.
     earlier : Earlier
         A clip that could not be read there for a reason that may pass gets another key, so that it is read
         again.
@@ -157,9 +209,14 @@ def lay_out(sources: Sequence[Source], reading: Any, size: int, earlier: Earlier
     clips = {source.clip_id: Clip(source, key(source)) for source in sources}
     names = earlier.names_of({source.clip_id: source.digest for source in sources})
     there = {before: now for now, before in names.items()}
-    stored = [sorted(there[one] for one in batch if one in there) for batch in earlier.batches]
-    batches = _batches([*clips], stored if earlier.batch_size == size else [], size)
-    return Layout([[clips[clip_id] for clip_id in batch] for batch in batches])
+    stored = [sorted(there[one] for one in side if one in there) for side in earlier.sides]
+    sides = _sides([*clips], stored if earlier.side == size else [], size)
+    return Layout(
+        [
+            [[clips[clip_id] for clip_id in batch] for batch in cut_by_name(side, min(size, BATCH))]
+            for side in sides
+        ]
+    )
 
 
 def _named(source: Source) -> Any:
@@ -170,16 +227,16 @@ def _named(source: Source) -> Any:
     return rate_in_name(Path(source.path).stem) if source.format == "asf/amc" else None
 
 
-def _batches(clip_ids: Sequence[str], stored: Sequence[Sequence[str]], size: int) -> list[list[str]]:
+def _sides(clip_ids: Sequence[str], stored: Sequence[Sequence[str]], size: int) -> list[list[str]]:
     """Lay clips out around those that are stored together, which stay so."""
-    batches = [list(batch) for batch in stored if batch]
-    if len(batches) > 2 + 2 * len(clip_ids) // size:
-        batches = []
-    placed = {one for batch in batches for one in batch}
+    sides = [list(side) for side in stored if side]
+    if len(sides) > 2 + 2 * len(clip_ids) // size:
+        sides = []
+    placed = {one for side in sides for one in side}
     new = [one for one in clip_ids if one not in placed]
-    if new and batches and len(batches[-1]) < size // 2:
-        new = sorted([*new, *batches.pop()])
-    return batches + batched_by_name(new, size)
+    if new and sides and len(sides[-1]) < size // 2:
+        new = sorted([*new, *sides.pop()])
+    return sides + cut_by_name(new, size)
 
 
 def digest_of_settings(*settings: Any) -> str:
@@ -188,24 +245,24 @@ def digest_of_settings(*settings: Any) -> str:
     return hashlib.blake2b(about.encode(), digest_size=16).hexdigest()
 
 
-def batched_by_name(clip_ids: Sequence[str], size: int) -> list[list[str]]:
-    """Cut clips into batches of about `size`, twice that at most.
+def cut_by_name(clip_ids: Sequence[str], size: int) -> list[list[str]]:
+    """Cut clips into runs of about `size`, twice that at most.
 
-    A batch ends after a clip whose name says so, by its digest. So a clip that comes or goes after a run that
-    was killed changes its own batch, not all that follow, and the results of the others are found again.
+    A run ends after a clip whose name says so, by its digest. So a clip that comes or goes after a job that
+    was killed changes its own run, not all that follow, and the results of the others are found again.
     """
-    batches: list[list[str]] = [[]]
+    runs: list[list[str]] = [[]]
     for clip_id in clip_ids:
-        batches[-1].append(clip_id)
+        runs[-1].append(clip_id)
         drawn = int.from_bytes(hashlib.blake2b(clip_id.encode(), digest_size=8).digest())
-        if drawn % size == 0 or len(batches[-1]) == 2 * size:
-            batches.append([])
-    return [batch for batch in batches if batch]
+        if drawn % size == 0 or len(runs[-1]) == 2 * size:
+            runs.append([])
+    return [run for run in runs if run]
 
 
-def _first_places(batches: Sequence[Mapping[str, str]]) -> dict[str, Place]:
+def _first_places(groups: Sequence[Mapping[str, str]]) -> dict[str, Place]:
     places: dict[str, Place] = {}
-    for number, batch in enumerate(batches):
-        for clip_id, key in batch.items():
+    for number, clips in enumerate(groups):
+        for clip_id, key in clips.items():
             places.setdefault(key, Place(number, clip_id))
     return places

@@ -23,18 +23,18 @@ class Origin(NamedTuple):
 
 
 class PairOrigin(NamedTuple):
-    """Where pairs can be had: the tile of two batches.
+    """Where pairs can be had: the tile of two sides.
 
     Parameters
     ----------
     earlier : bool
         Whether it is the earlier run's.
-    batches : tuple of int
+    sides : tuple of int
         The smaller first.
     """
 
     earlier: bool
-    batches: tuple[int, int]
+    sides: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Block:
     ----------
     origin : PairOrigin
     first, second : mapping of str to str
-        Of clips of a tile's first and second batch, what they are called there.
+        Of clips of a tile's first and second side, what they are called there.
     """
 
     origin: PairOrigin
@@ -65,20 +65,20 @@ def clip_origins(batch: int, layout: Layout, earlier: Earlier) -> dict[Origin, d
     for clip in layout.batches[batch]:
         before, own = earlier.places.get(clip.key), layout.places[clip.key]
         if before is not None:
-            found.setdefault(Origin(True, before.batch), {})[clip.clip_id] = before.clip_id
-        elif own.batch < batch:
-            found.setdefault(Origin(False, own.batch), {})[clip.clip_id] = own.clip_id
+            found.setdefault(Origin(True, before.number), {})[clip.clip_id] = before.clip_id
+        elif own.number < batch:
+            found.setdefault(Origin(False, own.number), {})[clip.clip_id] = own.clip_id
     return found
 
 
 def pair_origins(tile: tuple[int, int], layout: Layout, earlier: Earlier) -> list[Block]:
     """Say where the pairs of a tile can be had; those that are in no block are to be computed."""
-    first, second = (layout.batches[batch] for batch in tile)
+    first, second = (layout.sides[side] for side in tile)
     blocks = []
-    for one, ones in _by_earlier_batch(first, earlier).items():
-        for other, others in _by_earlier_batch(second, earlier).items():
+    for one, ones in _by_earlier_side(first, earlier).items():
+        for other, others in _by_earlier_side(second, earlier).items():
             if one is not None and other is not None:
-                blocks.append(_block(True, one, other, ones, others, earlier.places))
+                blocks.append(_block(True, one, other, ones, others, earlier.side_places))
             else:
                 blocks += _own_blocks(tile, ones, others, layout)
     return blocks
@@ -88,10 +88,10 @@ def _own_blocks(
     tile: tuple[int, int], ones: Sequence[Clip], others: Sequence[Clip], layout: Layout
 ) -> Iterator[Block]:
     """Find the pairs of contents that a tile before this one compares."""
-    for one, some in _by_own_batch(ones, layout).items():
-        for other, more in _by_own_batch(others, layout).items():
+    for one, some in _by_own_side(ones, layout).items():
+        for other, more in _by_own_side(others, layout).items():
             if (min(one, other), max(one, other)) != tile:
-                yield _block(False, one, other, some, more, layout.places)
+                yield _block(False, one, other, some, more, layout.side_places)
 
 
 def _block(
@@ -106,16 +106,16 @@ def _block(
     return Block(PairOrigin(earlier, (min(one, other), max(one, other))), first, second)
 
 
-def _by_earlier_batch(clips: Sequence[Clip], earlier: Earlier) -> dict[int | None, list[Clip]]:
+def _by_earlier_side(clips: Sequence[Clip], earlier: Earlier) -> dict[int | None, list[Clip]]:
     groups: dict[int | None, list[Clip]] = {}
     for clip in clips:
-        place = earlier.places.get(clip.key)
-        groups.setdefault(None if place is None else place.batch, []).append(clip)
+        place = earlier.side_places.get(clip.key)
+        groups.setdefault(None if place is None else place.number, []).append(clip)
     return groups
 
 
-def _by_own_batch(clips: Sequence[Clip], layout: Layout) -> dict[int, list[Clip]]:
+def _by_own_side(clips: Sequence[Clip], layout: Layout) -> dict[int, list[Clip]]:
     groups: dict[int, list[Clip]] = {}
     for clip in clips:
-        groups.setdefault(layout.places[clip.key].batch, []).append(clip)
+        groups.setdefault(layout.side_places[clip.key].number, []).append(clip)
     return groups

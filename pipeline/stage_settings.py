@@ -30,8 +30,14 @@ def stage_settings(config: PipelineConfig) -> dict[str, str]:
         "resample", resample.VERSION, reading, {name: getattr(config.features, name) for name in _MERGING}
     )
     drawn = config.distances.thresholds == "random"
+    pruned = () if config.most_distance is None else (config.most_distance,)
     compared = digest_of_settings(
-        "compare", compare.VERSION, merging, config.distances.thresholds, config.distances.seed * drawn
+        "compare",
+        compare.VERSION,
+        merging,
+        config.distances.thresholds,
+        config.distances.seed * drawn,
+        *pruned,
     )
     aligned = digest_of_settings(
         "align", align.VERSION, reading, asdict(config.alignment), config.features.frame_rate

@@ -1,5 +1,6 @@
 """Fixtures that more than one test module uses."""
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -8,14 +9,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import fsspec
+import numpy as np
 import pyarrow as pa
 import pytest
 import requests
+from filelock import FileLock
 
 from motionary.catalog.schema import PUBLISHED, SCHEMAS
 from motionary.catalog.snapshot import Snapshot, current_snapshot, next_snapshot_id, publish
 from motionary.catalog.store import PartFacts, Store
 from motionary.pipeline.config import PipelineConfig
+from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.synthetic import write_library
 from motionary.workflows import cli
 from motionary.workflows.main_job import run
@@ -33,19 +37,45 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def demo_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write the embedded library once; tests read it and do not change it."""
-    folder = tmp_path_factory.mktemp("demo") / "library"
-    write_library(folder)
-    return folder
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Return a way of making something of a name once for all processes that the tests are shared out to."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:  # each has a folder of its own in that of the whole run
+        folder = folder.parent
+
+    def make_once(name: str, make: Callable[[Path], object]) -> Path:
+        made, mark = folder / name, folder / f"{name.replace('/', '-')}.made"
+        with FileLock(mark.with_suffix(".lock")):
+            if not mark.exists():
+                made.parent.mkdir(exist_ok=True)
+                make(made)
+                mark.touch()
+        return made
+
+    return make_once
 
 
 @pytest.fixture(scope="session")
-def demo_catalog(demo_library: Path) -> str:
+def demo_library(made_once: Callable) -> Path:
+    """Write the embedded library once; tests read it and do not change it."""
+    return made_once("demo/library", write_library)
+
+
+@pytest.fixture(scope="session")
+def demo_catalog(demo_library: Path, made_once: Callable) -> str:
     """Run the main job on the embedded library once; tests only read the catalog."""
-    url = str(demo_library.parent / "catalog")
-    run(Job([str(demo_library)], url, PipelineConfig(), demo_library / "labels.csv"), silent)
-    return url
+
+    def make(folder: Path) -> None:
+        run(Job([str(demo_library)], str(folder), PipelineConfig(), demo_library / "labels.csv"), silent)
+
+    return str(made_once("demo/catalog", make))
+
+
+@pytest.fixture
+def cart() -> Motion:
+    """Return a motion of something that is no figure."""
+    skeleton = Skeleton(("body", "wheel"), (-1, 0), np.ones((2, 3)))
+    return Motion("cart", skeleton, 30, np.zeros((2, 3)), np.ones((2, 2, 4)))
 
 
 @pytest.fixture(scope="module")

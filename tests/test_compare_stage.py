@@ -2,6 +2,7 @@
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -43,6 +44,9 @@ def test_what_was_known_changes_nothing(first, second, data):
         one if within else {f"{'az'[content % 2]}{place}": content for place, content in enumerate(second)}
     )
     whole = compare(batch(one), batch(other), CONFIG)
+    far = sorted({*whole["pairs"]["weighted"].to_pylist()}) or [1.0]
+    # At a distance that a pair has, or between two, or with all pairs wanted.
+    most = data.draw(st.sampled_from([None, 0.0, *far, far[0] / 2 + far[-1] / 2]))
 
     carried = []
     for number in range(data.draw(st.integers(0, 2))):
@@ -56,6 +60,7 @@ def test_what_was_known_changes_nothing(first, second, data):
             batch({names[name]: content for name, content in others.items()}),
             batch({names[name]: content for name, content in known.items()}),
             CONFIG,
+            most,
         )
         block = Block(
             PairOrigin(True, (0, 1)),
@@ -63,4 +68,5 @@ def test_what_was_known_changes_nothing(first, second, data):
             {name: names[name] for name in others},
         )
         carried.append((earlier, block))
-    assert rows(compare(batch(one), batch(other), CONFIG, carried)) == rows(whole)
+    wanted = whole["pairs"].filter(pc.less_equal(whole["pairs"]["weighted"], np.inf if most is None else most))
+    assert rows(compare(batch(one), batch(other), CONFIG, most, carried)) == rows({"pairs": wanted})

@@ -12,11 +12,13 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 import typer
 import yaml
+from distributed.cli.dask_worker import main as dask_worker
 
 from motionary.workflows.cli import app
 from motionary.workflows.nightly_settings import load_nightly
@@ -194,7 +196,156 @@ def test_the_readme_names_every_file_and_no_other():
         assert (ROOT / path).exists(), path
 
 
+# More than one machine
+
+
+def dask_job() -> dict[str, Any]:
+    return yaml.safe_load((DEPLOY / "dask-cluster.yaml").read_text())
+
+
+def dask_pods() -> dict[str, dict[str, Any]]:
+    spec = dask_job()["spec"]
+    cluster = spec["cluster"]["spec"]
+    return {"job": spec["job"]["spec"]} | {name: cluster[name]["spec"] for name in ("worker", "scheduler")}
+
+
+def cloud_files() -> dict[str, str]:
+    text = (DEPLOY / "cloud-machine.yaml").read_text()
+    assert text.startswith("#cloud-config\n")
+    return {one["path"]: one["content"] for one in yaml.safe_load(text)["write_files"]}
+
+
+def cloud_service() -> str:
+    return cloud_files()["/etc/systemd/system/motionary-run.service"]
+
+
+def run_options(arguments: list[str]) -> dict[str, Any]:
+    """Parse the arguments of the main job; one that does not exist ends the test."""
+    command = typer.main.get_command(app).commands["run"]  # type: ignore[attr-defined]
+    return command.make_context("run", arguments).params
+
+
+def slurm_script() -> Any:
+    pytest.importorskip("dask_jobqueue")
+    module = ModuleType("slurm_cluster")
+    exec((DEPLOY / "slurm-cluster.sbatch").read_text(), vars(module))
+    return module
+
+
+def test_the_operators_job_is_of_the_fields_that_its_resource_has():
+    job = dask_job()
+    assert (job["apiVersion"], job["kind"]) == ("kubernetes.dask.org/v1", "DaskJob")
+    assert set(job["spec"]) == {"job", "cluster"}
+    assert set(job["spec"]["job"]) == {"spec"}
+    cluster = job["spec"]["cluster"]["spec"]
+    assert set(cluster) == {"worker", "scheduler"}
+    assert set(cluster["worker"]) == {"replicas", "spec"}
+    assert set(cluster["scheduler"]) == {"spec", "service"}
+    selector = cluster["scheduler"]["service"]["selector"]
+    assert selector == {"dask.org/cluster-name": job["metadata"]["name"], "dask.org/component": "scheduler"}
+    named = {one["name"] for one in dask_pods()["scheduler"]["containers"][0]["ports"]}
+    assert {port["targetPort"] for port in cluster["scheduler"]["service"]["ports"]} == named
+
+
+def test_its_pods_and_service_are_what_kubernetes_knows(tmp_path):
+    service = dask_job()["spec"]["cluster"]["spec"]["scheduler"]["service"]
+    objects = [
+        {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": name}, "spec": spec}
+        for name, spec in dask_pods().items()
+    ]
+    objects.append({"apiVersion": "v1", "kind": "Service", "metadata": {"name": "one"}, "spec": service})
+    (tmp_path / "objects.yaml").write_text(yaml.safe_dump_all(objects))
+    linted("kubernetes-validate", "--strict", tmp_path / "objects.yaml")
+
+
+def test_its_pods_see_the_same_paths_and_run_the_same_image():
+    pods = dask_pods()
+    containers = {name: one["containers"][0] for name, one in pods.items()}
+    assert {one["image"] for one in containers.values()} == {pod()["containers"][0]["image"]}
+    assert containers["job"]["volumeMounts"] == containers["worker"]["volumeMounts"]
+    assert pods["job"]["volumes"] == pods["worker"]["volumes"]
+    claims = [one["persistentVolumeClaim"] for one in pods["job"]["volumes"] if "emptyDir" not in one]
+    assert claims == [one["persistentVolumeClaim"] for one in pod()["volumes"][:2]]
+    program, *arguments = containers["job"]["args"]
+    assert program == "run"
+    options = run_options(arguments)
+    assert (str(options["library"]), options["catalog"]) == (f"{HOME}/library", f"{HOME}/catalog")
+    assert options["scheduler"] == "$(DASK_SCHEDULER_ADDRESS)"
+    worker = [*containers["worker"]["command"], *containers["worker"]["args"]]
+    assert dask_worker_options(worker[1:]) == {"nthreads": 1, "memory_limit": "0"}
+
+
+def dask_worker_options(command: list[str]) -> dict[str, Any]:
+    assert command[0] == "worker"
+    given = dask_worker.make_context("worker", command[1:]).params
+    return {name: given[name] for name in ("nthreads", "memory_limit")}
+
+
+def test_slurms_workers_are_a_process_a_core_without_a_limit_of_dasks():
+    script = slurm_script()
+    assert str(script.PROGRAM) == PROGRAM
+    assert str(script.HOME) == HOME
+    with script.cluster() as cluster:
+        lines = cluster.job_script().splitlines()
+        address = cluster.scheduler_address
+    assert f"export NUMBA_CACHE_DIR={HOME}/kernels" in lines
+    assert "#SBATCH --cpus-per-task=16" in lines
+    python, *command = shlex.split(lines[-1])
+    assert python == PROGRAM.replace("motionary/bin/motionary", "motionary/bin/python")
+    assert command[:2] == ["-m", "distributed.cli.dask_worker"]
+    assert command[2] == address
+    assert "--nworkers 16" in lines[-1]
+    assert dask_worker_options(["worker", *command[2:]]) == {"nthreads": 1, "memory_limit": "0"}
+
+
+def test_slurms_script_runs_the_job_on_its_scheduler(tmp_path, monkeypatch, capfd):
+    script = slurm_script()
+
+    class Cluster:
+        scheduler_address = "tcp://node:1234"
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *raised):
+            pass
+
+        def adapt(self, minimum_jobs, maximum_jobs):
+            assert minimum_jobs == maximum_jobs == script.JOBS
+
+    program = tmp_path / "motionary"
+    program.write_text('#!/bin/sh\necho "$*"; exit 3\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(script, "PROGRAM", program)
+    monkeypatch.setattr(script, "cluster", Cluster)
+    assert script.main(["LIBRARY", "CATALOG", "--paper"]) == 3
+    assert capfd.readouterr().out == "run LIBRARY CATALOG --paper --scheduler tcp://node:1234\n"
+
+
+def test_the_cloud_machine_runs_the_main_job_and_switches_itself_off():
+    parsed = yaml.safe_load((DEPLOY / "cloud-machine.yaml").read_text())
+    assert parsed["users"][0]["homedir"] == HOME
+    assert parsed["mounts"][0][1] == f"{HOME}/library"
+    lines = dict(
+        line.split("=", 1) for line in cloud_service().splitlines() if "=" in line and line[0] != "#"
+    )
+    program, command, *arguments = shlex.split(lines["ExecStart"])
+    assert (program, command) == (PROGRAM, "run")
+    options = run_options(arguments)
+    assert str(options["library"]) == f"{HOME}/library"
+    assert options["catalog"].startswith("s3://")
+    assert lines["SuccessAction"] == lines["FailureAction"] == "poweroff"
+    assert lines["SuccessExitStatus"] == "3"
+    assert parsed["runcmd"][-1] == "systemctl start --no-block motionary-run.service"
+
+
 # Linters
+
+
+def test_systemd_accepts_the_cloud_machines_unit(tmp_path):
+    file = tmp_path / "motionary-run.service"
+    file.write_text(cloud_service().replace(PROGRAM, "/bin/true").replace("User=motionary", "User=root"))
+    assert linted("systemd-analyze", "verify", "--man=no", file) == ""
 
 
 def test_systemd_accepts_the_units(tmp_path):
@@ -224,6 +375,10 @@ def test_kubernetes_schemas_accept_the_objects():
 def test_bash_and_shellcheck_accept_the_script():
     linted("bash", "-n", "nightly.sbatch")
     linted("shellcheck", "nightly.sbatch")
+
+
+def test_ruff_accepts_the_clusters_script():
+    linted("ruff", "check", "--extension", "sbatch:python", "slurm-cluster.sbatch")
 
 
 def test_the_workflows_schema_accepts_it():

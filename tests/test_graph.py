@@ -14,7 +14,7 @@ from motionary.pipeline.config import (
     ReadConfig,
 )
 from motionary.pipeline.graph import LibraryGraph
-from motionary.pipeline.layout import Earlier, batched_by_name, lay_out
+from motionary.pipeline.layout import Earlier, cut_by_name, lay_out, side_for
 from motionary.pipeline.readers.library import Source
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.pipeline.tables import TABLES
@@ -32,7 +32,8 @@ def library(clips: int) -> list[Source]:
 def graph_of(sources, config=None, labels=NO_LABELS, overrides=NOT_SAID) -> LibraryGraph:
     earlier = Earlier()
     config = config or PipelineConfig()
-    layout = lay_out(sources, reading_settings(config), config.distances.tile, earlier)
+    side = config.distances.tile or side_for(len(sources), earlier)
+    layout = lay_out(sources, reading_settings(config), side, earlier)
     return LibraryGraph(layout, labels, overrides, config, earlier, lambda key, tables: True)
 
 
@@ -72,10 +73,37 @@ def test_tasks_follow_what_they_read():
 def test_batches_hold_every_clip_once_in_order(size):
     sources = library(200)
     clip_ids = [source.clip_id for source in sources]
-    batches = batched_by_name(clip_ids, size)
+    batches = cut_by_name(clip_ids, size)
     assert [clip for batch in batches for clip in batch] == clip_ids
     assert max(map(len, batches)) <= 2 * size
     assert all(batches)
+
+
+@pytest.mark.parametrize(
+    ("clips", "side"), [(1, 32), (455, 32), (1000, 64), (3000, 128), (10_000, 256), (142_000, 1024)]
+)
+def test_sides_grow_with_the_library_so_that_tiles_do_not_become_many(clips, side):
+    assert side_for(clips, Earlier()) == side
+    assert (clips / side) * (clips / side + 1) / 2 < max(120, clips / 5)
+
+
+def test_a_side_stays_while_the_library_has_not_grown_much():
+    assert side_for(1000, Earlier(side=32)) == 32
+    assert side_for(3000, Earlier(side=32)) == 128
+    assert side_for(300, Earlier(side=64)) == 64
+    assert side_for(300, Earlier(side=256)) == 32
+
+
+def test_sides_are_read_in_batches_and_tiles_read_all_of_them():
+    graph = graph_of(library(500), PipelineConfig(distances=DistanceConfig(tile=128)))
+    layout = graph.layout
+    assert len(layout.sides) < len(layout.batches)
+    assert max(map(len, layout.batches)) <= 64
+    assert [clip for batch in layout.batches for clip in batch] == [*layout]
+    assert [clip for side in layout.sides for clip in side] == [*layout]
+    read = {table_keys for task in graph.compared for _, keys in task.reads for table_keys in keys}
+    assert read == {task.key for task in graph.resampled}
+    assert len(graph.compared) == len(layout.sides) * (len(layout.sides) + 1) // 2
 
 
 @pytest.mark.parametrize("place", [0, 100, 199])

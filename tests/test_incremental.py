@@ -58,7 +58,7 @@ def work(monkeypatch) -> Counter:
     counted(ingest, "read_motion", "read")
     counted(compare, "_compare", "compared", lambda values, rows, columns, *_: len(rows) * len(columns))
     counted(compare, "_among", "compared", lambda values, some, *_: len(some) * (len(some) - 1) // 2)
-    counted(represent, "score_references", "represented")
+    counted(represent, "similarity_index", "represented")
     counted(align, "cotw_search", "aligned")
     return done
 

@@ -88,14 +88,7 @@ def test_what_cannot_be_is_refused(walk, joints, rate, what):
         joint_rotations(walk, joints, rate)
 
 
-def test_a_skeleton_of_another_kind_is_refused():
-    cart = Motion(
-        "cart",
-        Skeleton(("body", "wheel"), (-1, 0), np.ones((2, 3))),
-        30,
-        np.zeros((2, 3)),
-        np.ones((2, 2, 4)),
-    )
+def test_a_skeleton_of_another_kind_is_refused(cart):
     with pytest.raises(UnknownSkeletonError, match="body, wheel"):
         joint_rotations(cart)
 

@@ -22,6 +22,7 @@ from motionary.catalog.views.mu_kappa import mu_kappa_figure, steps
 from motionary.catalog.views.overview import overview_page
 from motionary.pipeline.clustering import cut_tree
 from motionary.pipeline.config import AlignmentConfig, ClusterConfig
+from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.align import align
 from motionary.pipeline.stages.cluster import cluster
 from motionary.pipeline.stages.identify import identify
@@ -73,16 +74,17 @@ def make_catalog(folder, demo, clip_ids, labels=NO_LABELS, config=None, quaranti
     frames, features = own("frames", "clip_id"), own("features", "clip_id")
     pairs = own("pairs", "clip_a", "clip_b")
     none = {name: schema.empty_table() for name, schema in SCHEMAS.items()}
-    made = none | cluster(ingested, pairs, labels, none["labels"], config)
+    made = none | cluster(ingested, Parts.of(pairs), labels, none["labels"], config)
     made |= identify(made["groups"], none["members"], none["lineage"], {}, "")
     made |= represent(
-        made["members"], pairs, ingested, features, none["centres"], none["reference_features"], {},
-        config, AlignmentConfig(),
+        made["members"], ingested, none["centres"], none["reference_features"], Parts.of(pairs),
+        Parts.of(features), {}, config, AlignmentConfig(), 2**30,
     )  # fmt: skip
     made |= align(
         ingested, frames, features, made["represented"], made["reference_features"], AlignmentConfig(), 30.0
     )
-    made |= style(made["represented"], ingested, made["aligned"], none["styles"], {}, (), 30.0)
+    clips, aligned = Parts.of(ingested), Parts.of(made["aligned"])
+    made |= style(made["represented"], none["styles"], clips, aligned, {}, (), 30.0, 2**30)
     made |= name_them(made["clips"], made["represented"], made["centres"], none["labels"], config)
     made |= {"frames": frames, "features": features, "pairs": pairs, "resampled": own("resampled", "clip_id")}
     made["quarantine"] = pa.Table.from_pylist(list(quarantine), schema=SCHEMAS["quarantine"])

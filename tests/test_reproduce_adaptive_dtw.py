@@ -14,7 +14,6 @@ from motionary.pipeline.synthetic import synthetic_library
 from motionary.workflows.errors import UserError
 from motionary.workflows.reproduce import adaptive_dtw as experiment
 from motionary.workflows.reproduce.adaptive_dtw import (
-    AdaptiveExperiment,
     Library,
     comparable_pairs,
     pairs_to_join,
@@ -33,12 +32,13 @@ from motionary.workflows.reproduce.adaptive_dtw_measures import (
     measure_pair,
 )
 from motionary.workflows.reproduce.adaptive_dtw_report import PAPER, adaptive_dtw_report, claims
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.cotw_measures import KNOWN, Measurement, Measurements
 from motionary.workflows.reproduce.labelled import LabelledClips
 
 
 @pytest.fixture(scope="module")
-def conducted(silent_progress) -> AdaptiveExperiment:
+def conducted(silent_progress) -> Conducted[Measurements]:
     """Conduct it on the walks and jumps of one rig alone."""
     library = synthetic_library()
     takes = [take for take in library if take.action in ("walk", "jump") and take.convention == "mixamo"]
@@ -171,7 +171,14 @@ def test_the_report_sets_ours_beside_what_the_paper_says(conducted):
     Console(file=shown, width=200).print(adaptive_dtw_report(conducted))
     text = shown.getvalue()
     assert all(len(line) <= 200 for line in text.splitlines())
-    for words in (*PAPER.values(), "Known warps", "radius 3, K 5", "prints\nno numbers", "seed 0"):
+    for words in (
+        *PAPER.values(),
+        "Known warps",
+        "radius 3, K 5",
+        "prints\nno numbers",
+        "seed 0",
+        "stands still for less",
+    ):
         assert words in text
     assert "Pairs of takes: 2, of 2 of 2 actions; of sequences of takes joined: 1." in text
     stay = conducted.study.of(TAKES, "stay")[ADAPTIVE].mean()
@@ -187,7 +194,7 @@ def test_claims_are_judged_by_the_numbers():
             for name in METHODS
             for measure, value in values.items()
         ]
-        return ["does not" not in one for one in claims(Measurements(rows))]
+        return [one.holds for one in claims(Measurements(rows))]
 
     assert judged(4, 4, 4) == [True] * 4
     assert judged(6, 4, 4) == [False, True, True, True]
@@ -204,12 +211,16 @@ def test_claims_compare_what_both_methods_align_and_print_it():
         for measure in ("stay", "jerk", "deviation")
     ]
     *_, limited, constrained = claims(Measurements(rows))
-    assert limited.startswith("On 1 of 2 sequences ")
-    assert limited.endswith("than constrained DTW, 2 steps: holds, 2.00 against 3.00 on average.")
-    assert constrained.startswith("On 2 sequences ")
-    assert constrained.endswith("than constrained DTW, K 2: holds, 5.50 against 7.50 on average.")
+    assert limited.claim.endswith("than constrained DTW, 2 steps")
+    assert limited.holds
+    assert limited.here == "deviation 2.00 against 3.00, means over 1 of 2 sequences"
+    assert constrained.claim.endswith("than constrained DTW, K 2")
+    assert constrained.holds
+    assert constrained.here == "deviation 5.50 against 7.50, means over 2 sequences"
     without = [row for row in rows if row.method != LIMITED]
-    assert "constrained DTW, 2 steps aligns none" in claims(Measurements(without))[2]
+    untold = claims(Measurements(without))[2]
+    assert untold.holds is None
+    assert "constrained DTW, 2 steps aligns none" in untold.here
 
 
 def test_a_catalog_of_other_rigs_is_refused_and_one_of_the_same_read(

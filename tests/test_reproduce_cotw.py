@@ -15,7 +15,8 @@ from motionary.pipeline.motion import Motion, Skeleton
 from motionary.pipeline.synthetic import ACTIONS as ACTION_NAMES
 from motionary.pipeline.synthetic import STYLES, synthetic_library, template_frames
 from motionary.workflows.reproduce import cotw as experiment
-from motionary.workflows.reproduce.cotw import ANGLES, POSITIONS, CotwExperiment, study_cotw
+from motionary.workflows.reproduce.conducted import Conducted
+from motionary.workflows.reproduce.cotw import ANGLES, POSITIONS, study_cotw
 from motionary.workflows.reproduce.cotw_measures import (
     FIXED,
     KNOWN,
@@ -190,7 +191,7 @@ def test_the_papers_t_tests_follow_from_its_means():
 
 
 @pytest.fixture(scope="module")
-def conducted(demo_catalog, silent_progress) -> CotwExperiment:
+def conducted(demo_catalog, silent_progress) -> Conducted[Measurements]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiment, "synthetic_library", lambda: synthetic_library()[:: 2 * len(STYLES) - 1])
         return study_cotw(Catalog.open(demo_catalog), "action", 2, 0, silent_progress)

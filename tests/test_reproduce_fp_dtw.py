@@ -17,7 +17,8 @@ from motionary.pipeline.synthetic import ACTIONS, STYLES
 from motionary.workflows.errors import UserError
 from motionary.workflows.reproduce import fp_dtw as experiment
 from motionary.workflows.reproduce import fp_dtw_clips, fp_dtw_measures
-from motionary.workflows.reproduce.fp_dtw import FpExperiment, study_fp_dtw
+from motionary.workflows.reproduce.conducted import Conducted
+from motionary.workflows.reproduce.fp_dtw import study_fp_dtw
 from motionary.workflows.reproduce.fp_dtw_claims import PASS_BOTH, claims, improved, passing
 from motionary.workflows.reproduce.fp_dtw_clips import (
     RATES,
@@ -300,19 +301,19 @@ def test_the_report_fits_a_page_whatever_is_found():
     """Printed to a file, where nothing is folded; every algorithm passes, is improved and is late."""
     rows = made_up(120, **{str(one): (0.6 + one.type_v / 10, 17.0 - one.type_v) for one in ALGORITHMS})
     rows = [row._replace(microseconds=None if row.microseconds is None else 1e5) for row in rows]
-    shown = _shown(FpExperiment(FpStudy(rows), ["a note"]), width=10_000).splitlines()
+    shown = _shown(Conducted(FpStudy(rows), ["a note"]), width=10_000).splitlines()
     assert "a note" in shown[0]
     assert max(len(line.rstrip()) for line in shown) <= 150
 
 
-def _shown(conducted: FpExperiment, width: int = 200) -> str:
+def _shown(conducted: Conducted[FpStudy], width: int = 200) -> str:
     shown = io.StringIO()
     Console(file=shown, width=width).print(fp_dtw_report(conducted))
     return shown.getvalue()
 
 
 @pytest.fixture(scope="module")
-def conducted(silent_progress) -> FpExperiment:
+def conducted(silent_progress) -> Conducted[FpStudy]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fp_dtw_clips, "ACTIONS", {name: ACTIONS[name] for name in ("punch", "kick")})
         patch.setattr(fp_dtw_clips, "EMBEDDED_TAKES", 1)

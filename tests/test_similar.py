@@ -16,6 +16,7 @@ from motionary.catalog import Catalog, CatalogError, mutual
 from motionary.catalog.example import example_of, library_features
 from motionary.catalog.joint_columns import joint_columns
 from motionary.catalog.mutual import usual_distances
+from motionary.catalog.own_pairs import side_count
 from motionary.catalog.ranked_distance import ranked_distance
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, FeatureConfig, PipelineConfig
@@ -151,15 +152,16 @@ def test_a_file_is_ranked_by_mutual_proximity_too(demo_catalog, demo_library):
         assert len(set(stored) & set(found.table["clip_id"].to_pylist())) >= 3
 
 
-def test_usual_distances_of_many_batches_are_to_some_of_them(fuzzy_catalog, monkeypatch):
-    monkeypatch.setattr(mutual, "_BATCHES", 3)
+def test_usual_distances_of_many_sides_are_to_some_of_them(fuzzy_catalog, monkeypatch):
     with Catalog.open(fuzzy_catalog) as catalog:
+        clips, sides = len(catalog.inputs), side_count(catalog)
+        monkeypatch.setattr(mutual, "_PAIRS", 3 * (clips // sides) * clips)
         clip_ids, distances = catalog.clips.to_arrow()["clip_id"].combine_chunks(), square(catalog, "dtw")
         usual = usual_distances(catalog, clip_ids, ranked_distance(catalog.config, "dtw"))
-        batches = dict(catalog.sql("select clip_id, batch from inputs").to_pandas().to_numpy())
-        chosen = {batches[clip_ids[int(place)].as_py()] for place in usual.others}
+        on = dict(catalog.sql("select clip_id, side from inputs").to_pandas().to_numpy())
+        chosen = {on[clip_ids[int(place)].as_py()] for place in usual.others}
         assert len(chosen) == 3
-        assert {0, max(batches.values())} < chosen
+        assert {0, max(on.values())} < chosen
         for clip in range(len(clip_ids)):
             own = [float(distances[clip, other]) for other in usual.others if other != clip]
             assert usual.mean[clip] == pytest.approx(np.mean(own), rel=1e-12)
@@ -203,7 +205,7 @@ def test_a_preset_weighs_joints(demo_catalog):
     assert len(full.columns) == 57
 
 
-def test_only_the_files_of_its_batch_are_opened(fuzzy_catalog, tmp_path):
+def test_only_the_files_of_its_side_are_opened(fuzzy_catalog, tmp_path):
     copy, held = Path(shutil.copytree(fuzzy_catalog, tmp_path / "catalog")), []
     with Catalog.open(fuzzy_catalog) as whole:
         clip_id = clip_ids_of(whole)[11]

@@ -22,6 +22,7 @@ from motionary.workflows.commands import (
     label,
     look,
     nightly,
+    plan,
     report,
     reproduce,
     run,
@@ -65,6 +66,7 @@ def motionary(
 # A module's EXAMPLES name its commands; the order is that of `motionary --help`.
 for module in (
     run,
+    plan,
     nightly,
     look,
     report,

@@ -29,6 +29,7 @@ class StoredParts:
         self._store = store
         self._before = before
         self._keys: dict[str, set[str]] = {}
+        self._damaged: set[str] = set()
 
     def __call__(self, key: str, tables: Iterable[str]) -> bool:
         """Say whether a result is stored whole."""
@@ -52,11 +53,17 @@ class StoredParts:
             try:
                 facts = self._store.facts(file)
             except (OSError, ValueError):  # pyarrow says so of a damaged file
-                return None
-            if facts != self._older.get(file, facts):
+                facts = None
+            if facts is None or facts != self._older.get(file, facts):
+                self._damaged.add(file)
                 return None
             found[table] = facts
         return found
+
+    def remove_damaged(self) -> None:
+        """Remove the files that `facts` found not to be what was written: a task would take them for done."""
+        while self._damaged:
+            self._store.delete(self._damaged.pop())
 
     def add(self, report: TaskReport) -> None:
         """Take note of a result that has been stored."""
@@ -112,6 +119,7 @@ class Computation:
         """
         stored = {task.key: self._stored.facts(task.key, task.makes) for task in tasks}
         missing = [task for task in tasks if stored[task.key] is None]
+        self._stored.remove_damaged()
         reports = {report.key: report for report in self._workers.compute(missing, self._store, self._done)}
         for report in reports.values():
             self._stored.add(report)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from motionary.pipeline.config import DistanceConfig, PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
-from motionary.pipeline.layout import Earlier, lay_out
+from motionary.pipeline.layout import Earlier, lay_out, side_for
 from motionary.pipeline.readers.library import Source
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.pipeline.tables import TABLES
@@ -63,7 +63,8 @@ def draw_graph(out: Path, library: Path | None) -> None:
 
 def _tasks(sources: Sequence[Source], config: PipelineConfig) -> list[Task]:
     """List all tasks, as if every clip could be read and all were one cluster."""
-    layout = lay_out(sources, reading_settings(config), config.distances.tile, Earlier())
+    side = config.distances.tile or side_for(len(sources), Earlier())
+    layout = lay_out(sources, reading_settings(config), side, Earlier())
     empty = TABLES["labels"].empty_table()
     graph = LibraryGraph(layout, NO_LABELS.table, empty, config, Earlier(), lambda key, tables: False)
     members = [{"clip_id": clip.clip_id, "cluster_id": 1} for clip in layout]

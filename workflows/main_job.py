@@ -15,11 +15,17 @@ from motionary.catalog.store import Store
 from motionary.catalog.writer_lock import Writer, the_only_writer
 from motionary.pipeline.task import TaskReport
 from motionary.workflows.computation import Computation, StoredParts
+from motionary.workflows.costs.amounts import Amounts
+from motionary.workflows.costs.disk import refuse_small_disks
+from motionary.workflows.costs.memory import refuse
+from motionary.workflows.costs.model import with_seconds
+from motionary.workflows.crew import Remark
 from motionary.workflows.errors import UserError
 from motionary.workflows.plan import Plan
 from motionary.workflows.preparation import Job, Prepared, prepare
 from motionary.workflows.publication import Check, publish_run
 from motionary.workflows.scheduler import Workers
+from motionary.workflows.workplace import Workplace
 
 _SECONDS_TO_START = 4.0
 """Seconds that a worker process takes until it works: it imports what this one has imported."""
@@ -61,6 +67,7 @@ def run(
     take_over: Callable[[Writer], object] = lambda writer: None,
     planned: Callable[[Plan], object] = lambda plan: None,
     check: Check = lambda before, after: None,
+    remark: Remark = lambda text: None,
 ) -> RunResult:
     """Ingest, compare, cluster, name and align a library, then publish the result in one step.
 
@@ -80,6 +87,8 @@ def run(
     check : callable
         Given the published catalog, None where there is none, and the one about to be published. What it
         raises leaves the published one as it is.
+    remark : callable
+        Told how many workers there are, when that changes, and where to watch them.
 
     Raises
     ------
@@ -87,18 +96,21 @@ def run(
         Another process writes this catalog.
     UserError
         The library is missing or holds no clip or too few, the labels file cannot be used, the catalog's
-        folder holds something else, the scheduler cannot be reached, or compiled kernels cannot be kept.
+        folder holds something else, the run needs more memory or disk than there is, the scheduler cannot be
+        reached or its workers lack something, or compiled kernels cannot be kept.
     """
     started = datetime.now(UTC)
     ready = prepare(job)
+    _refuse_too_much(ready)
     _claim(ready.store)
     with the_only_writer(ready.store, take_over):
         if current_snapshot(ready.store) != ready.before:  # somebody published while this run was preparing
             ready = prepare(job)
+        ready = with_seconds(ready, compiling, remark)
         planned(ready.plan)
         with (
             show_progress(ready.graph.tasks_by_stage()) as done,
-            Workers(_processes(ready), job.scheduler, compiling) as workers,
+            Workers(_processes(ready), job.scheduler, compiling, _workplace(ready), remark) as workers,
         ):
             # Listed anew under the lock: a vacuum may have come between.
             stored = StoredParts(ready.store, ready.before)
@@ -108,6 +120,13 @@ def run(
     return RunResult(
         catalog, ready.supplied.outside, ready.stale_labels, computed, len(made) - computed, ready.plan
     )
+
+
+def _refuse_too_much(ready: Prepared) -> None:
+    """Refuse what does not fit before anything is written; workers elsewhere have disks of their own."""
+    refuse(ready.need)
+    if ready.job.scheduler is None:
+        refuse_small_disks(ready.store, Amounts.of(ready.graph.layout), ready.plan, ready.need)
 
 
 def _claim(store: Store) -> None:
@@ -132,6 +151,12 @@ def _processes(ready: Prepared) -> int:
     workers = ready.job.workers
     work = None if ready.plan.seconds is None else ready.plan.seconds * workers
     return 1 if work is not None and work < _SECONDS_TO_START * workers else workers
+
+
+def _workplace(ready: Prepared) -> Workplace | None:
+    """Say what workers elsewhere must find."""
+    sources = (clip.source for batch in ready.graph.layout.batches for clip in batch)
+    return Workplace.of(ready.store, sources) if ready.job.scheduler else None
 
 
 def _compute(ready: Prepared, computation: Computation) -> list[TaskReport]:

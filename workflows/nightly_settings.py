@@ -16,6 +16,7 @@ from typing import Annotated, Any
 from dask.system import CPU_COUNT
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from motionary.workflows.costs.sizes import parse_size
 from motionary.workflows.preparation import Job
 from motionary.workflows.settings import (
     EnvironmentSettings,
@@ -37,6 +38,10 @@ def _limit(value: object) -> object:
     if isinstance(value, int) and (isinstance(value, bool) or value < 0):
         raise ValueError(f"{value} is no limit; give a count of clips (5) or a share of them (0.05)")
     return value
+
+
+def _size(value: object) -> object:
+    return parse_size(value) if isinstance(value, str) else value
 
 
 def _pattern(value: str) -> str:
@@ -69,6 +74,7 @@ class JobTable(_Table):
     libraries: tuple[Text, ...] | Text
     catalog: Text
     workers: int | None = Field(default=None, ge=1)
+    memory: Annotated[int, BeforeValidator(_size)] | None = None
     scheduler: Text | None = None
 
     @model_validator(mode="after")
@@ -194,6 +200,7 @@ def load_nightly(file: Path) -> NightlySettings:
             label_pattern=labels.pattern,
             workers=nightly.job.workers or CPU_COUNT,
             scheduler=nightly.job.scheduler,
+            memory=nightly.job.memory,
         ),
         nightly.retention,
         nightly.limits,

@@ -10,6 +10,8 @@ from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.graph import LibraryGraph
 from motionary.pipeline.task import Task
+from motionary.workflows.costs.memory import Need
+from motionary.workflows.costs.sizes import needed_text, time_text
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,10 @@ class Plan:
         Pairs that have to be computed.
     seconds : float, optional
         About how long that takes, judging by the catalog's last run that computed; None before there is one.
+    memory : int
+        Bytes that the run's processes hold at most, see `motionary.workflows.costs.memory`.
+    memory_allowed : int, optional
+        Bytes that they may hold; None where nobody knows.
     """
 
     new: int
@@ -37,6 +43,8 @@ class Plan:
     to_read: int
     to_compare: int
     seconds: float | None
+    memory: int
+    memory_allowed: int | None
 
     def __str__(self) -> str:
         counts = {
@@ -46,11 +54,12 @@ class Plan:
         clips = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
         took = "how long is not known before a first run"
         if self.seconds is not None:
-            took = f"about {self.seconds:.0f} s and what starting takes"
-        return f"clips: {clips}; {self.to_read} to read, {self.to_compare} pairs to compare; {took}"
+            took = f"about {time_text(self.seconds)} and what starting takes"
+        todo = f"{self.to_read} to read, {self.to_compare} pairs to compare"
+        return f"clips: {clips}; {todo}; {took}; memory: {needed_text(self.memory, self.memory_allowed)}"
 
 
-def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers: int) -> Plan:
+def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers: int, need: Need) -> Plan:
     """See what a run would do.
 
     Parameters
@@ -63,6 +72,8 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
         The published one.
     workers : int
         Among which the work is divided.
+    need : Need
+        The memory.
     """
     digests, earlier = graph.layout.digests, graph.earlier.digests
     names = graph.names
@@ -77,6 +88,7 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
         unchanged=len(names) - renamed - changed,
         to_read=to_read, to_compare=to_compare,
         seconds=_seconds(store, before, touched, to_read, to_compare, workers),
+        memory=need.bytes, memory_allowed=need.allowed,
     )  # fmt: skip
 
 
@@ -94,7 +106,7 @@ def _contents_to_read(graph: LibraryGraph) -> int:
 
 def _pairs_to_compare(graph: LibraryGraph) -> int:
     """Count the pairs that no stored result holds, were every clip to be read."""
-    tiles = combinations_with_replacement(graph.layout.batches, 2)
+    tiles = combinations_with_replacement(graph.layout.sides, 2)
     count = 0
     for task, (first, second) in zip(graph.compared, tiles, strict=True):
         if not graph.is_stored(task.key, task.makes):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -24,10 +24,12 @@ from motionary.catalog.snapshot import CURRENT, Snapshot, current_snapshot
 from motionary.catalog.store import Store
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
-from motionary.pipeline.layout import lay_out
+from motionary.pipeline.layout import lay_out, side_for
 from motionary.pipeline.readers.library import KnownDigest, KnownMembers, Source, scan_library
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.workflows.computation import StoredParts
+from motionary.workflows.costs.amounts import Amounts
+from motionary.workflows.costs.memory import Need, need_of
 from motionary.workflows.errors import UserError
 from motionary.workflows.labels_file import SuppliedLabels, supplied_labels
 from motionary.workflows.plan import Plan, plan_run
@@ -53,6 +55,9 @@ class Job:
         A running Dask scheduler instead.
     label_pattern : str, optional
         Regular expression on clip_ids whose named groups are label columns; a value of the CSV wins.
+    memory : int, optional
+        Bytes that all processes of this machine may take together, or with `scheduler` one worker; by default
+        what the machine has.
     """
 
     libraries: Sequence[str]
@@ -62,6 +67,7 @@ class Job:
     workers: int = 1
     scheduler: str | None = None
     label_pattern: str | None = None
+    memory: int | None = None
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,7 @@ class Prepared:
     labels: pa.Table
     graph: LibraryGraph
     plan: Plan
+    need: Need
 
 
 def prepare(job: Job) -> Prepared:
@@ -103,16 +110,20 @@ def prepare(job: Job) -> Prepared:
     supplied = supplied_labels(job.labels, job.label_pattern, sources, job.config.clusters.label_column)
 
     earlier = earlier_run(store, before, then)
-    layout = lay_out(sources, reading_settings(job.config), job.config.distances.tile, earlier)
+    side = job.config.distances.tile or side_for(len(sources), earlier)
+    job = replace(job, config=replace(job.config, distances=replace(job.config.distances, tile=side)))
+    layout = lay_out(sources, reading_settings(job.config), side, earlier)
     _refuse_without_numbers(store, before)
     said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
     inputs = inputs_table(layout)
     labels = following(said or SCHEMAS["labels"].empty_table(), inputs)
     overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
-    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, StoredParts(store, before))
-    plan = plan_run(graph, store, before, job.workers)
+    need = need_of(Amounts.of(layout), job.workers, job.memory, job.scheduler)
+    stored = StoredParts(store, before)
+    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
+    plan = plan_run(graph, store, before, job.workers, need)
     stale = _stale_labels(job, supplied, graph.names, then)
-    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, graph, plan)
+    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, graph, plan, need)
 
 
 def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:

@@ -5,11 +5,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import timedelta
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.text import Text
 
 Advance = Callable[[str], None]
+
+_REMEMBERED = 600.0
+"""Seconds over which a stage's speed is taken: a task may last for minutes, and several end together."""
 
 
 @contextmanager
@@ -32,8 +45,11 @@ def progress(totals: Mapping[str, int], console: Console) -> Iterator[Advance]:
 
 
 def _bars(totals: Mapping[str, int], console: Console) -> Iterator[Advance]:
-    columns = (TextColumn("{task.description:<10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bars:
+    columns = (
+        TextColumn("{task.description:<10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        _TimeLeft(),
+    )  # fmt: skip
+    with Progress(*columns, console=console, speed_estimate_period=_REMEMBERED) as bars:
         rows = {stage: bars.add_task(stage, total=total, start=False) for stage, total in totals.items()}
 
         def advance(stage: str) -> None:
@@ -41,6 +57,16 @@ def _bars(totals: Mapping[str, int], console: Console) -> Iterator[Advance]:
             bars.advance(rows[stage])
 
         yield advance
+
+
+class _TimeLeft(ProgressColumn):
+    """How long a stage will still take, at the speed that it has; nothing where that is not known."""
+
+    max_refresh = 0.5
+
+    def render(self, task: Task) -> Text:
+        seconds = task.time_remaining
+        return Text("" if task.finished or seconds is None else f"{timedelta(seconds=round(seconds))} left")
 
 
 def _lines(totals: Mapping[str, int], console: Console) -> Iterator[Advance]:

@@ -99,7 +99,12 @@ def stage_settings(
     except ValueError as error:  # wrong joints
         raise SettingsError(f"{file or 'settings'}: {error}") from None
     features = FeatureConfig(**{**_fields(settings.features), "conventions": own})
-    return PipelineConfig(settings.read, features, settings.distances, settings.clusters, settings.alignment)
+    try:
+        return PipelineConfig(
+            settings.read, features, settings.distances, settings.clusters, settings.alignment
+        )
+    except ValueError as error:  # settings of two stages that do not go together
+        raise SettingsError(f"{file or 'settings'}: {error}") from None
 
 
 def read_toml(file: Path) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """Where the clips of a library lie on its map, read from their distances.
 
 Up to 1,500 clips are laid out by all their distances. Of more, 1,500 landmarks are: the references of the
-clusters, the largest first, and clips spread evenly over the library, of 100 batches at most, since the
-distances of a clip lie in as many files as there are batches. See `motionary.catalog.views.embedding`.
+clusters, the largest first, and clips spread evenly over the library, of so many sides of tiles that some 30
+million pairs are read, since the distances of a clip lie among those of its side. See
+`motionary.catalog.views.embedding`.
 """
 
 from __future__ import annotations
@@ -15,14 +16,19 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from motionary.catalog.own_pairs import batch_count, pairs_with_batch
-from motionary.catalog.places import batch_of
+from motionary.catalog.own_pairs import (
+    pairs_with_side,
+    refuse_without_all_pairs,
+    side_count,
+    side_of,
+    sides_to_read,
+)
 from motionary.catalog.query import Catalog
 from motionary.catalog.ranked_distance import RankedDistance, ranked_distance
 from motionary.catalog.views.embedding import NEIGHBOURS, laid_out, placed_among
 
 LANDMARKS = 1500
-_BATCHES = 100
+_PAIRS = 30_000_000
 
 
 def library_map(catalog: Catalog, places: NDArray[np.float64] | None = None) -> pa.Table:
@@ -44,7 +50,8 @@ def library_map(catalog: Catalog, places: NDArray[np.float64] | None = None) -> 
     Raises
     ------
     CatalogError
-        Another version of motionary made the snapshot; or a file is damaged.
+        Another version of motionary made the snapshot, or its run did not compare all pairs; or a file is
+        damaged.
     """
     clips = catalog.clusters.to_arrow().select(["clip_id", "cluster_id", "label"]).sort_by("clip_id")
     places = map_places(catalog) if places is None else places
@@ -62,6 +69,7 @@ def library_map(catalog: Catalog, places: NDArray[np.float64] | None = None) -> 
 
 def map_places(catalog: Catalog) -> NDArray[np.float64]:
     """Find the places alone, (N, 2) in clip_id order; see `library_map`."""
+    refuse_without_all_pairs(catalog, "the map")
     clip_ids = catalog.clusters.to_arrow()["clip_id"].combine_chunks().sort()
     distance = ranked_distance(catalog.config)
     if len(clip_ids) <= LANDMARKS:
@@ -86,20 +94,20 @@ def _all_distances(
 
 @dataclass(frozen=True, eq=False)
 class _Landmarks:
-    """Clips that are laid out: their numbers among all clips, rising, and the batches that they are in."""
+    """Clips that are laid out: their numbers among all clips, rising, and the sides that they are on."""
 
     clips: NDArray[np.intp]
-    batches: list[int]
+    sides: list[int]
 
 
 def _landmarks(catalog: Catalog, clip_ids: list[str]) -> _Landmarks:
-    batch = batch_of(catalog)
+    side, most = side_of(catalog), sides_to_read(catalog, _PAIRS)
     by_size = catalog.references.to_arrow().sort_by([("size", "descending"), ("cluster_id", "ascending")])
     references = by_size["clip_id"].to_pylist()[: LANDMARKS // 2]
-    batches = list(dict.fromkeys(batch[one] for one in references))[: _BATCHES // 2]
-    evenly = np.linspace(0, batch_count(catalog) - 1, _BATCHES - len(batches)).round()
-    kept = {*batches, *evenly.astype(int).tolist()}
-    there = np.array([batch[one] in kept for one in clip_ids])
+    sides = list(dict.fromkeys(side[one] for one in references))[: most // 2]
+    evenly = np.linspace(0, side_count(catalog) - 1, most - len(sides)).round()
+    kept = {*sides, *evenly.astype(int).tolist()}
+    there = np.array([side[one] in kept for one in clip_ids])
     wanted = set(references)
     first = np.flatnonzero(there & np.array([one in wanted for one in clip_ids]))
     others = np.setdiff1d(np.flatnonzero(there), first)
@@ -127,14 +135,14 @@ def _distances_to(
 def _rows(
     catalog: Catalog, clip_ids: pa.StringArray, chosen: _Landmarks, distance: RankedDistance
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:
-    """Read landmarks batch by batch: their numbers among the landmarks, their distances to all clips."""
-    batch = batch_of(catalog)
-    at = np.array([batch[clip_ids[number].as_py()] for number in chosen.clips])
-    for one in chosen.batches:
+    """Read landmarks side by side: their numbers among the landmarks, their distances to all clips."""
+    side = side_of(catalog)
+    at = np.array([side[clip_ids[number].as_py()] for number in chosen.clips])
+    for one in chosen.sides:
         rows = np.flatnonzero(at == one)
         if not len(rows):
             continue
-        pairs = pairs_with_batch(catalog, one, distance.columns)
+        pairs = pairs_with_side(catalog, one, distance.columns)
         values = distance.of(pairs)
         row_of = np.full(len(clip_ids), -1)
         row_of[chosen.clips[rows]] = np.arange(len(rows))

@@ -43,7 +43,7 @@ def overview_page(catalog: Catalog) -> str:
             heading(catalog),
             _clusters(catalog),
             dendrogram_section(catalog, charts[0], chart_html),
-            threshold_section(charts[1], chart_html),
+            threshold_section(catalog, charts[1], chart_html),
             scores_section(catalog),
             quarantine_section(catalog),
         ],

@@ -25,7 +25,10 @@ def score_row(cut: Cut) -> list[str]:
     if cut["classes"]:
         best = cut["reward_punish_best"]
         for at in ("", "_true"):
-            scores += [f"{cut[f'reward_punish{at}']} / {best}", f"{cut[f'ari{at}']:.3f}"]
+            known = cut[f"ari{at}"] is not None
+            scores += (
+                [f"{cut[f'reward_punish{at}']} / {best}", f"{cut[f'ari{at}']:.3f}"] if known else ["-"] * 2
+            )
     name = f"{cut['metric']}{' *' if cut['primary'] else ''}"
     return [name, cut["method"], f"{cut['n_clusters']} ({cut['rule']})", *scores, _strip(cut)]
 

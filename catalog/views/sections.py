@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from motionary.catalog.own_pairs import all_pairs_are_there
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.colours import cluster_character, cluster_colour
 from motionary.catalog.views.dendrogram import MOST_LEAF_NAMES
@@ -109,7 +110,7 @@ def purity_text(cluster: dict[str, Any]) -> str:
 def dendrogram_section(catalog: Catalog, figure: go.Figure | None, show: Show) -> str:
     """Show the dendrogram and its cut."""
     if figure is None:
-        return section("Dendrogram", "A dendrogram needs two clips.", name="dendrogram")
+        return section("Dendrogram", why_no_chart(catalog, "A dendrogram"), name="dendrogram")
     hidden = "" if len(catalog.clips) <= MOST_LEAF_NAMES else " Point at a leaf to read its clip."
     return section(
         "Dendrogram",
@@ -120,11 +121,11 @@ def dendrogram_section(catalog: Catalog, figure: go.Figure | None, show: Show) -
     )
 
 
-def threshold_section(figure: go.Figure | None, show: Show) -> str:
+def threshold_section(catalog: Catalog, figure: go.Figure | None, show: Show) -> str:
     """Show how many clusters each threshold leaves."""
     title, name = "Clusters by threshold", "thresholds"
     if figure is None:
-        return section(title, "The curve needs two clips.", name=name)
+        return section(title, why_no_chart(catalog, "The curve"), name=name)
     return section(
         title,
         "How many clusters κ the threshold μ leaves, for each distance. A long level stretch is a number of "
@@ -132,6 +133,20 @@ def threshold_section(figure: go.Figure | None, show: Show) -> str:
         show(figure, "thresholds-chart"),
         name=name,
     )
+
+
+def why_no_chart(catalog: Catalog, what: str) -> str:
+    """Say why a chart of all clips' distances is missing."""
+    if all_pairs_are_there(catalog):
+        return f"{what} needs two clips."
+    return f"{what} needs all pairs: {SOME_PAIRS[catalog.config.distances.pairs]}"
+
+
+SOME_PAIRS = {
+    "pruned": "this run compared those alone whose weighted distance may be at most the threshold. Its "
+    "clusters are exactly those of complete linkage; those of other distances and linkages are not known.",
+}
+"""What a run that did not compare all pairs leaves open."""
 
 
 def scores_section(catalog: Catalog) -> str:

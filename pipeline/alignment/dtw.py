@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
-from motionary.pipeline.alignment.warp import at_a_clear_size, checked_pair, checked_sequence
-from motionary.pipeline.alignment.weights import checked_weights
+from motionary.pipeline.alignment.warp import checked_sequence
+from motionary.pipeline.alignment.weights import weighted_pair
 from motionary.pipeline.alignment.windows import Window, check_window
 from motionary.pipeline.motion import FloatArray
 
@@ -61,12 +61,7 @@ def dtw(
     from motionary.pipeline.distances import cost_matrix, dtw_path
 
     check_window(window)
-    moving, reference = checked_pair(moving, reference)
-    if weights is not None:
-        scale = np.sqrt(checked_weights(weights, reference.shape[1]))
-        moving, reference = moving * scale, reference * scale
-    # Distances are roots of sums of squares, which are 0 of what is below 1e-162.
-    (moving, reference), _ = at_a_clear_size(moving, reference)
+    moving, reference = weighted_pair(moving, reference, weights)
     if window is None:
         path = dtw_path(cost_matrix(moving, reference))
     else:
@@ -104,7 +99,7 @@ def derivative_dtw(
     ValueError
         As `dtw`.
     """
-    (moving, reference), _ = at_a_clear_size(*checked_pair(moving, reference))
+    moving, reference = weighted_pair(moving, reference)
     return dtw(derivatives(moving), derivatives(reference), weights, window)
 
 
@@ -128,8 +123,7 @@ def nearest_path(moving: FloatArray, reference: FloatArray) -> NDArray[np.int64]
     """
     from motionary.pipeline.distances import cost_matrix, dtw_path
 
-    (moving, reference), _ = at_a_clear_size(*checked_pair(moving, reference))
-    return dtw_path(cost_matrix(moving, reference) ** 2)
+    return dtw_path(cost_matrix(*weighted_pair(moving, reference)) ** 2)
 
 
 def derivatives(values: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ from motionary.pipeline.alignment.generalized_alternation import (
     greatest_trace,
 )
 from motionary.pipeline.alignment.generalized_time import warp_steps
-from motionary.pipeline.alignment.warp import Warp, checked_sequence, interpolate
+from motionary.pipeline.alignment.warp import Warp, checked_sequence, checked_sequences, interpolate
 from motionary.pipeline.alignment.warp_weights import LEAST_SHARE, Ends
 from motionary.pipeline.motion import FloatArray
 
@@ -143,12 +143,7 @@ def generalized_pair(moving: FloatArray, reference: FloatArray) -> Warp:
 
 def _checked(sequences: Sequence[FloatArray]) -> list[FloatArray]:
     """Return sequences as float64 arrays, after checking that there is something to align."""
-    arrays: list[FloatArray] = [
-        checked_sequence(values, f"sequence {place}").astype(np.float64)
-        for place, values in enumerate(sequences)
-    ]
-    if len(arrays) < 2:
-        raise ValueError(f"the number of sequences is {len(arrays)}; it takes two to align")
+    arrays = checked_sequences(sequences)
     for place, values in enumerate(arrays):
         if len(values) < 2:
             raise ValueError(f"sequence {place} has one frame; a warp needs two to run through")

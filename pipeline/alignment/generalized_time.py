@@ -27,7 +27,7 @@ import numpy as np
 
 from motionary.pipeline.alignment.bases import Basis
 from motionary.pipeline.alignment.quadratic_programme import UnsolvedError, solve_programme
-from motionary.pipeline.alignment.warp import Warp, checked_sequence, interpolate
+from motionary.pipeline.alignment.warp import Warp, checked_sequences, interpolate
 from motionary.pipeline.alignment.warp_weights import (
     LEAST_SHARE,
     Ends,
@@ -244,15 +244,9 @@ def _dots(one: FloatArray, other: FloatArray) -> FloatArray:
 
 def _checked(sequences: Sequence[FloatArray], bases: Sequence[Basis]) -> list[FloatArray]:
     """Return the sequences as float64 arrays, after checking that they fit each other and their bases."""
-    if len(sequences) < 2 or len(sequences) != len(bases):
-        raise ValueError(
-            f"there are {len(sequences)} sequences and {len(bases)} bases; "
-            "it takes two sequences or more, with a basis each"
-        )
-    arrays: list[FloatArray] = [
-        checked_sequence(values, f"sequence {place}").astype(np.float64)
-        for place, values in enumerate(sequences)
-    ]
+    arrays = checked_sequences(sequences)
+    if len(arrays) != len(bases):
+        raise ValueError(f"there are {len(arrays)} sequences and {len(bases)} bases; it takes a basis each")
     for place, (values, basis) in enumerate(zip(arrays, bases, strict=True)):
         if len(values) < 2:
             raise ValueError(f"sequence {place} has one frame; a warp needs two to run through")

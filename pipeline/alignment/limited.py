@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionary.pipeline.alignment.path_warp import PathWarp, path_warp
-from motionary.pipeline.alignment.warp import checked_pair
-from motionary.pipeline.alignment.weights import checked_weights
+from motionary.pipeline.alignment.weights import weighted_pair
 from motionary.pipeline.motion import FloatArray
 
 MOST_WAYS = 1 << 30
@@ -49,14 +48,11 @@ def limited_dtw(
     from motionary.pipeline.alignment.limited_kernels import limited_path
     from motionary.pipeline.distances import cost_matrix
 
-    moving, reference = checked_pair(moving, reference)
+    moving, reference = weighted_pair(moving, reference, weights)
     if not 1 <= most <= 60:
         raise ValueError(f"most is {most}; it is a number of steps from 1 to 60")
     n, m = len(moving), len(reference)
     _refuse_too_long(n, m, most)
-    if weights is not None:
-        scale = np.sqrt(checked_weights(weights, reference.shape[1]))
-        moving, reference = moving * scale, reference * scale
     before = np.zeros((n, m, 2 * most + 1), dtype=np.int8)
     path = np.empty((n + m - 1, 2), dtype=np.int64)
     begin = limited_path(cost_matrix(moving, reference).astype(np.float64), most, before, path)

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionary.pipeline.alignment.warp import checked_sequence
+from motionary.pipeline.alignment.warp import checked_sequences
 from motionary.pipeline.motion import FloatArray
 
 _NO_VARIANCE = 1e-10  # of a direction's share of its sequence's greatest singular value
@@ -159,12 +159,7 @@ def checked_steps(sequences: Sequence[FloatArray]) -> list[FloatArray]:
     ValueError
         As `multiset_cca`.
     """
-    arrays: list[FloatArray] = [
-        checked_sequence(values, f"sequence {place}").astype(np.float64)
-        for place, values in enumerate(sequences)
-    ]
-    if len(arrays) < 2:
-        raise ValueError(f"there are {len(arrays)} sequences; it takes two to agree")
+    arrays = checked_sequences(sequences)
     for place, values in enumerate(arrays):
         if len(values) != len(arrays[0]):
             raise ValueError(

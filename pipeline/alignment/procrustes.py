@@ -37,7 +37,7 @@ from motionary.pipeline.alignment.dtw import derivatives
 from motionary.pipeline.alignment.generalized_time import warp_steps
 from motionary.pipeline.alignment.scale_and_offset import checked_smoothness, fit_scale_and_offset
 from motionary.pipeline.alignment.steps_to_mean import one_frame_a_step, uniform_path
-from motionary.pipeline.alignment.warp import Warp, checked_sequence
+from motionary.pipeline.alignment.warp import Warp, checked_sequences
 from motionary.pipeline.motion import FloatArray
 
 _MOST_ROUNDS = 100
@@ -209,11 +209,7 @@ def _disagreement(sequences: list[FloatArray], path: NDArray[np.int64], mean: Fl
 
 
 def _checked(sequences: Sequence[FloatArray], steps: int | None) -> tuple[list[FloatArray], int]:
-    arrays: list[FloatArray] = [
-        checked_sequence(values, f"sequence {i}").astype(np.float64) for i, values in enumerate(sequences)
-    ]
-    if len(arrays) < 2:
-        raise ValueError(f"there are {len(arrays)} sequences; it takes two or more to have a mean")
+    arrays = checked_sequences(sequences)
     for i, values in enumerate(arrays):
         if values.shape[1] != arrays[0].shape[1]:
             raise ValueError(

@@ -25,7 +25,8 @@ from motionary.pipeline.alignment.warp import checked_sequence, checked_stack, i
 from motionary.pipeline.alignment.weights import checked_weights
 from motionary.pipeline.motion import FloatArray
 
-_BLOCK = 512  # clips whose correlations with all others are held at a time
+_BLOCK = 512  # clips whose correlations with all others are held at a time,
+_BLOCK_VALUES = 2**22  # fewer where they are more than 32 MB
 _TIE = 1e-9
 
 
@@ -131,13 +132,29 @@ def score_references(
             )
     weights = checked_weights(weights, arrays[0].shape[1])
     distances = _checked_distances(distances, len(arrays))
-    frames = round(float(np.median([len(array) for array in arrays])))
-    matched = np.stack([interpolate(array, uniform_times(len(array), frames)) for array in arrays])
+    frames = median_length([len(array) for array in arrays])
+    matched = np.stack([length_matched(array, frames) for array in arrays])
     similarity = similarity_index(matched, weights)
     if np.isfinite(similarity).any():
-        return ReferenceScores(_first_within(-similarity), similarity)
+        return ReferenceScores(first_of_least(-similarity), similarity)
     sums = distances.sum(axis=1) if distances is not None else _distance_sums(matched, weights)
-    return ReferenceScores(_first_within(sums), similarity)
+    return ReferenceScores(first_of_least(sums), similarity)
+
+
+def median_length(lengths: Sequence[int]) -> int:
+    """Return the length that sequences are brought to: their median, rounded, halves to even."""
+    return round(float(np.median(lengths)))
+
+
+def length_matched(values: FloatArray, frames: int) -> FloatArray:
+    """Bring a sequence (n, dofs) to a length, linearly; the dtype stays."""
+    return interpolate(values, uniform_times(len(values), frames))
+
+
+def first_of_least(values: FloatArray) -> int:
+    """Return the place of the least value, of those within 1e-9 of it (relative) the first."""
+    least = values.min()
+    return int(np.argmax(values <= least + _TIE * max(1.0, abs(least))))
 
 
 def _log_products(values: FloatArray, levels: FloatArray) -> FloatArray:
@@ -148,12 +165,14 @@ def _log_products(values: FloatArray, levels: FloatArray) -> FloatArray:
         return np.full(len(values), -np.inf)
     unit = centred / np.where(norms > 0, norms, 1.0)[:, None]
     sums = np.empty(len(values))
-    for start in range(0, len(values), _BLOCK):
-        rho = np.minimum(np.abs(unit[start : start + _BLOCK] @ unit.T), 1.0)
+    block = max(1, min(_BLOCK, _BLOCK_VALUES // len(values)))
+    for start in range(0, len(values), block):
+        rho = unit[start : start + block] @ unit.T
+        np.minimum(np.abs(rho, out=rho), 1.0, out=rho)
         rows = np.arange(len(rho))
         rho[rows, start + rows] = 1.0
         with np.errstate(divide="ignore"):
-            sums[start : start + _BLOCK] = np.log(rho).sum(axis=1)
+            sums[start : start + block] = np.log(rho, out=rho).sum(axis=1)
     return sums
 
 
@@ -161,11 +180,6 @@ def _distance_sums(matched: FloatArray, weights: FloatArray) -> FloatArray:
     flat = (matched * np.sqrt(weights)).reshape(len(matched), -1)
     blocks = [cdist(flat[start : start + _BLOCK], flat) for start in range(0, len(flat), _BLOCK)]
     return np.concatenate([block.sum(axis=1) for block in blocks])
-
-
-def _first_within(values: FloatArray) -> int:
-    least = values.min()
-    return int(np.argmax(values <= least + _TIE * max(1.0, abs(least))))
 
 
 def _checked_distances(distances: FloatArray | None, clips: int) -> FloatArray | None:

@@ -6,6 +6,7 @@ by slerp, so a warp slows and hastens a motion without still frames [CoTW 3.1].
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,6 +166,23 @@ def checked_pair(moving: FloatArray, reference: FloatArray) -> tuple[FloatArray,
             f"moving has {moving.shape[1]} DOFs and reference {reference.shape[1]}; they must have the same"
         )
     return moving, reference
+
+
+def checked_sequences(sequences: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return two or more sequences, each of any frames and DOFs, as float64 arrays, after checking each.
+
+    Raises
+    ------
+    ValueError
+        As `checked_sequence`, or there are fewer than two.
+    """
+    arrays: list[FloatArray] = [
+        checked_sequence(values, f"sequence {place}").astype(np.float64)
+        for place, values in enumerate(sequences)
+    ]
+    if len(arrays) < 2:
+        raise ValueError(f"there are {len(arrays)} sequences; it takes two or more")
+    return arrays
 
 
 def checked_stack(clips: FloatArray) -> FloatArray:

@@ -5,15 +5,21 @@ Pair (i, j), i < j, stands at i N - i (i+1) / 2 + j - i - 1: row by row of the u
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isqrt
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Place = TypeVar("Place", int, NDArray[np.int64])
+
+_BLOCK = 1 << 20
+
 
 def places_of(first: NDArray[np.int64], second: NDArray[np.int64], clips: int) -> NDArray[np.int64]:
     """Return where pairs stand, given by the places of their clips, first < second."""
-    return first * clips - first * (first + 1) // 2 + second - first - 1
+    return row_start(first, clips) + second - first - 1
 
 
 def clip_count(condensed: NDArray[np.floating]) -> int:
@@ -34,8 +40,13 @@ def clip_count(condensed: NDArray[np.floating]) -> int:
     return clips
 
 
-def checked_distances(name: str, condensed: ArrayLike) -> NDArray[np.float64]:
-    """Return condensed distances as float64, all finite and not negative.
+def blocks(size: int) -> Iterator[slice]:
+    """Divide an array into blocks of a million entries, to look at one after the other."""
+    return (slice(start, start + _BLOCK) for start in range(0, size, _BLOCK))
+
+
+def checked_distances(name: str, condensed: ArrayLike) -> NDArray[np.floating]:
+    """Return condensed distances, all finite and not negative; as they are where float32 or float64.
 
     Raises
     ------
@@ -43,34 +54,39 @@ def checked_distances(name: str, condensed: ArrayLike) -> NDArray[np.float64]:
         The array is not condensed, or a distance is wrong; the message calls the array `name` and says which
         pair.
     """
-    distances = np.asarray(condensed, dtype=np.float64)
+    distances = np.asarray(condensed)
+    if distances.dtype not in (np.float32, np.float64):
+        distances = distances.astype(np.float64)
     if distances.ndim != 1:
         raise ValueError(
             f"{name} has shape {distances.shape}; it must be condensed, (N(N-1)/2,): "
             "scipy.spatial.distance.squareform turns a square matrix into one"
         )
     clips = clip_count(distances)
-    wrong = ~(np.isfinite(distances) & (distances >= 0))
-    if wrong.any():
-        pair = int(np.argmax(wrong))
-        raise ValueError(
-            f"{name}: the distance of {clips_of(pair, clips)} is {distances[pair]}; "
-            "distances must be finite and not negative"
-        )
+    for block in blocks(len(distances)):
+        wrong = ~(np.isfinite(distances[block]) & (distances[block] >= 0))
+        if wrong.any():
+            pair = block.start + int(np.argmax(wrong))
+            raise ValueError(
+                f"{name}: the distance of {clips_of(pair, clips)} is {distances[pair]}; "
+                "distances must be finite and not negative"
+            )
     return distances
 
 
 def clips_of(pair: int, clips: int) -> str:
     """Name the two clips whose distance stands at index `pair`, for a message."""
-    rows = np.arange(clips)
-    starts = rows * clips - rows * (rows + 1) // 2
+    first, second = pair_at(pair, clips)
+    return f"clips {first} and {second}"
+
+
+def pair_at(pair: int, clips: int) -> tuple[int, int]:
+    """Return the places of the two clips, first < second, whose distance stands at index `pair`."""
+    starts = row_start(np.arange(clips), clips)
     first = int(np.searchsorted(starts[:-1], pair, side="right")) - 1
-    return f"clips {first} and {first + 1 + pair - int(starts[first])}"
+    return first, first + 1 + pair - int(starts[first])
 
 
-def distances_of(clip: int, condensed: NDArray[np.float64], clips: int) -> NDArray[np.float64]:
-    """Return the row (N,) of one clip: its distance to every clip, infinite to itself."""
-    before = np.arange(clip)
-    above = places_of(before, np.full(clip, clip), clips)
-    start = clip * clips - clip * (clip + 1) // 2
-    return np.concatenate([condensed[above], [np.inf], condensed[start : start + clips - clip - 1]])
+def row_start(clip: Place, clips: int) -> Place:
+    """Return where the distances of a clip to the clips after it start."""
+    return clip * clips - clip * (clip + 1) // 2

@@ -56,9 +56,12 @@ def label_cut(Z: NDArray[np.float64], labels: Sequence[str | None]) -> LevelScor
     held = [Counter([label] if label is not None else []) for label in labels]
     score = [0]
     for left, right in Z[:, :2].astype(int).tolist():
-        same = sum(count * held[right][label] for label, count in held[left].items())
-        score.append(score[-1] + 4 * same - 2 * held[left].total() * held[right].total())
-        held.append(held[left] + held[right])
+        less, more = sorted((held[left], held[right]), key=len)
+        same = sum(count * more[label] for label, count in less.items())
+        score.append(score[-1] + 4 * same - 2 * less.total() * more.total())
+        more.update(less)
+        less.clear()
+        held.append(more)
     return best_level(Z, np.arange(clips, 0, -1), np.array(score, dtype=np.float64))
 
 

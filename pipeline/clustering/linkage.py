@@ -17,8 +17,9 @@ Deviations from the paper: the key is c + tau (d - c) written as a convex sum, w
 non-monotone, and which is single linkage at tau = 0 and complete linkage at tau = 1 to the bit. Where merges
 tie, dendrograms are not unique: here the lowest index wins, save that the chain's last link comes first.
 
-Memory: a condensed float64 working copy, 4 N^2 bytes (100 MB at N = 5000); twice that for fuzzy linkage. The
-caller's arrays are left as they are.
+Memory: a condensed working copy. Least and greatest distances of float32 ones are float32 themselves, so
+complete linkage takes 2 N^2 bytes of them (50 MB at N = 5000) and fuzzy linkage 4 N^2; ward and average take
+4 N^2, and all of float64 distances twice as much. The caller's arrays are left as they are.
 """
 
 from __future__ import annotations
@@ -26,19 +27,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.clustering.condensed import checked_distances, clip_count, clips_of
+from motionary.pipeline.clustering.condensed import blocks, checked_distances, clip_count, clips_of
+from motionary.pipeline.clustering.mapped import NewArray
 
 MIN, MAX, MEAN, WARD = range(4)
 """How a channel's distances to a merged cluster follow from those to its parts."""
 
 
-def complete_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
+def complete_linkage(condensed: ArrayLike, new_array: NewArray = np.empty) -> NDArray[np.float64]:
     """Merge the clusters whose furthest clips are nearest: equation 9 of [DC 5].
 
     Parameters
     ----------
     condensed : array (N(N-1)/2,)
         Distances in scipy's squareform order, finite and not negative. None at all means one clip.
+    new_array : callable
+        Makes the working copy: `numpy.empty`, or `mapped_array` where it may not fit into memory.
 
     Returns
     -------
@@ -51,18 +55,18 @@ def complete_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
     ValueError
         The length is not that of a condensed matrix, or a distance is not finite or is negative.
     """
-    return _link([checked_distances("condensed", condensed)], (MAX,), (1.0,))
+    return _link([checked_distances("condensed", condensed)], (MAX,), (1.0,), new_array)
 
 
-def average_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
+def average_linkage(condensed: ArrayLike, new_array: NewArray = np.empty) -> NDArray[np.float64]:
     """Merge the clusters whose clips are nearest on average (UPGMA).
 
     Parameters, returned matrix and errors are those of `complete_linkage`.
     """
-    return _link([checked_distances("condensed", condensed)], (MEAN,), (1.0,))
+    return _link([checked_distances("condensed", condensed)], (MEAN,), (1.0,), new_array)
 
 
-def ward_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
+def ward_linkage(condensed: ArrayLike, new_array: NewArray = np.empty) -> NDArray[np.float64]:
     """Merge the clusters that least raise the mean distance inside clusters: Ward's method on square roots.
 
     The distance takes the place of a squared length, so the result is that of
@@ -71,7 +75,7 @@ def ward_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    condensed : array (N(N-1)/2,)
+    condensed, new_array
         As for `complete_linkage`.
 
     Returns
@@ -84,7 +88,7 @@ def ward_linkage(condensed: ArrayLike) -> NDArray[np.float64]:
     ValueError
         As for `complete_linkage`.
     """
-    merges = _link([checked_distances("condensed", condensed)], (WARD,), (1.0,))
+    merges = _link([checked_distances("condensed", condensed)], (WARD,), (1.0,), new_array)
     merges[:, 2] = np.sqrt(merges[:, 2])
     return merges
 
@@ -93,7 +97,9 @@ LINKAGES = {"complete": complete_linkage, "ward": ward_linkage, "average": avera
 """Those that read one distance a pair."""
 
 
-def fuzzy_linkage(low: ArrayLike, high: ArrayLike, tau: float = 0.5) -> NDArray[np.float64]:
+def fuzzy_linkage(
+    low: ArrayLike, high: ArrayLike, tau: float = 0.5, new_array: NewArray = np.empty
+) -> NDArray[np.float64]:
     """Merge by interval distances: equation 11 of [DC 5].
 
     Two clusters lie [c, d] apart: c the least low, d the greatest high among their pairs of clips. The merge
@@ -105,6 +111,8 @@ def fuzzy_linkage(low: ArrayLike, high: ArrayLike, tau: float = 0.5) -> NDArray[
         Ends of every pair's interval (equation 10), in scipy's squareform order.
     tau : float
         0 is single linkage on `low`, 1 complete linkage on `high`; .5 in the paper.
+    new_array : callable
+        As for `complete_linkage`.
 
     Returns
     -------
@@ -121,24 +129,33 @@ def fuzzy_linkage(low: ArrayLike, high: ArrayLike, tau: float = 0.5) -> NDArray[
         raise ValueError(f"low holds {len(lows)} pairs and high {len(highs)}; they must be of the same clips")
     if not 0 <= tau <= 1:
         raise ValueError(f"tau is {tau}; it must lie in 0 .. 1")
-    if (lows > highs).any():
-        pair = int(np.argmax(lows > highs))
-        raise ValueError(
-            f"the interval of {clips_of(pair, clip_count(lows))} is [{lows[pair]}, {highs[pair]}]; "
-            "low must not exceed high"
-        )
-    return _link([lows, highs], (MIN, MAX), (1 - tau, tau))
+    for block in blocks(len(lows)):
+        wrong = lows[block] > highs[block]
+        if wrong.any():
+            pair = block.start + int(np.argmax(wrong))
+            raise ValueError(
+                f"the interval of {clips_of(pair, clip_count(lows))} is [{lows[pair]}, {highs[pair]}]; "
+                "low must not exceed high"
+            )
+    return _link([lows, highs], (MIN, MAX), (1 - tau, tau), new_array)
 
 
 def _link(
-    channels: list[NDArray[np.float64]], rules: tuple[int, ...], weights: tuple[float, ...]
+    channels: list[NDArray[np.floating]],
+    rules: tuple[int, ...],
+    weights: tuple[float, ...],
+    new_array: NewArray,
 ) -> NDArray[np.float64]:
     from motionary.pipeline.clustering.linkage_kernels import nearest_neighbour_chain
 
     clips = clip_count(channels[0])
     if clips == 1:
         return np.empty((0, 4))
-    merged, heights = nearest_neighbour_chain(np.stack(channels), np.array(rules), np.array(weights), clips)
+    exact = np.result_type(*channels) if {MIN, MAX}.issuperset(rules) else np.float64
+    values = new_array((len(channels[0]), len(channels)), exact)
+    for place, channel in enumerate(channels):
+        values[:, place] = channel
+    merged, heights = nearest_neighbour_chain(values, np.array(rules), np.array(weights), clips)
     order = np.argsort(heights, kind="stable")
     return _relabelled(merged[order], heights[order])
 

@@ -10,17 +10,25 @@ from motionary.pipeline.clustering.linkage import MAX, MEAN, MIN
 
 @njit(nogil=True, cache=True)
 def nearest_neighbour_chain(values, rules, weights, clips):  # type: ignore[no-untyped-def]
-    """Merge until one cluster is left; `values` (channels, pairs) is used up.
+    """Merge until one cluster is left; `values` (pairs, channels) is used up.
 
-    A cluster lives in the slot of its last clip. Returns the slots of every merge (clips-1, 2) and its key.
+    A cluster lives in the slot of its last clip. Once half of the slots are empty, the others close up, in
+    their order: what is walked through shrinks with the clusters, and no tie is decided otherwise.
+
+    Returns the last clips of the two clusters of every merge (clips-1, 2), and its key.
     """
     merged = np.empty((clips - 1, 2), np.int64)
     heights = np.empty(clips - 1)
     size = np.ones(clips, np.int64)
+    last = np.arange(clips)
+    starts = _starts(clips)
     chain = np.empty(clips, np.int64)
     links = 0
     first = 0
     for step in range(clips - 1):
+        if 2 * (clips - step) <= len(size):
+            size, last, starts = _closed_up(values, size, last, starts, chain[:links])
+            first = 0
         if links == 0:
             while size[first] == 0:
                 first += 1
@@ -28,38 +36,57 @@ def nearest_neighbour_chain(values, rules, weights, clips):  # type: ignore[no-u
             links = 1
         while True:
             tip = chain[links - 1]
-            # Starting from the last link lets it win ties, without which the chain could go round for ever.
-            nearest = chain[links - 2] if links > 1 else -1
-            least = _key(values, weights, _pair(clips, tip, nearest)) if links > 1 else np.inf
-            for other in range(clips):
-                if size[other] == 0 or other == tip:
-                    continue
-                key = _key(values, weights, _pair(clips, tip, other))
-                if key < least or nearest < 0:
-                    least, nearest = key, other
-            if links > 1 and nearest == chain[links - 2]:
+            before = chain[links - 2] if links > 1 else -1
+            nearest, least = _nearest(values, weights, size, starts, tip, before)
+            if nearest == before:
                 break
             chain[links] = nearest
             links += 1
         links -= 2
         gone, kept = min(tip, nearest), max(tip, nearest)
-        merged[step, 0], merged[step, 1], heights[step] = gone, kept, least
-        _merge(values, rules, size, gone, kept)
+        merged[step, 0], merged[step, 1], heights[step] = last[gone], last[kept], least
+        _merge(values, rules, size, starts, gone, kept)
     return merged, heights
 
 
 @njit(nogil=True, cache=True)
-def _merge(values, rules, size, gone, kept):  # type: ignore[no-untyped-def]
-    clips = len(size)
-    between = _pair(clips, gone, kept)
-    for other in range(clips):
+def _starts(slots):  # type: ignore[no-untyped-def]
+    """Return what is to be added to the second slot of a pair to get its place, for every first one."""
+    starts = np.empty(slots, np.int64)
+    for slot in range(slots):
+        starts[slot] = slot * slots - slot * (slot + 1) // 2 - slot - 1
+    return starts
+
+
+@njit(nogil=True, cache=True)
+def _nearest(values, weights, size, starts, tip, before):  # type: ignore[no-untyped-def]
+    """Find the cluster nearest to the chain's tip, and its key; `before` is -1 where it is the only link."""
+    nearest = before
+    least = np.inf
+    if before >= 0:
+        # Starting from the last link lets it win ties, without which the chain could go round for ever.
+        least = _key(values, weights, starts[min(tip, before)] + max(tip, before))
+    for other in range(len(size)):
+        if size[other] == 0 or other == tip:
+            continue
+        key = _key(values, weights, starts[min(tip, other)] + max(tip, other))
+        if key < least or nearest < 0:
+            least, nearest = key, other
+    return nearest, least
+
+
+@njit(nogil=True, cache=True)
+def _merge(values, rules, size, starts, gone, kept):  # type: ignore[no-untyped-def]
+    between = starts[gone] + kept
+    for other in range(len(size)):
         if size[other] == 0 or other in (gone, kept):
             continue
-        a, b = _pair(clips, gone, other), _pair(clips, kept, other)
+        a = starts[min(gone, other)] + max(gone, other)
+        b = starts[min(kept, other)] + max(kept, other)
         for channel in range(len(rules)):
-            row = values[channel]
-            distances = (row[a], row[b], row[between])
-            row[b] = _updated(rules[channel], distances, (size[gone], size[kept], size[other]))
+            distances = (values[a, channel], values[b, channel], values[between, channel])
+            sizes = (size[gone], size[kept], size[other])
+            values[b, channel] = _updated(rules[channel], distances, sizes)
     size[kept] += size[gone]
     size[gone] = 0
 
@@ -85,11 +112,21 @@ def _updated(rule, distances, sizes):  # type: ignore[no-untyped-def]
 def _key(values, weights, pair):  # type: ignore[no-untyped-def]
     key = 0.0
     for channel in range(len(weights)):
-        key += weights[channel] * values[channel, pair]
+        key += weights[channel] * values[pair, channel]
     return key
 
 
 @njit(nogil=True, cache=True)
-def _pair(clips, i, j):  # type: ignore[no-untyped-def]
-    low, high = min(i, j), max(i, j)
-    return low * clips - low * (low + 1) // 2 + high - low - 1
+def _closed_up(values, size, last, starts, chain):  # type: ignore[no-untyped-def]
+    """Move the distances of the slots in use to the front of `values`, and renumber the chain."""
+    used = np.flatnonzero(size)
+    now = np.zeros(len(size), np.int64)
+    place = 0
+    for slot in range(len(used)):
+        now[used[slot]] = slot
+        for other in range(slot + 1, len(used)):
+            values[place] = values[starts[used[slot]] + used[other]]
+            place += 1
+    for link in range(len(chain)):
+        chain[link] = now[chain[link]]
+    return size[used], last[used], _starts(len(used))

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionary.pipeline.clustering.condensed import checked_distances, clip_count, distances_of
+from motionary.pipeline.clustering.condensed import checked_distances, clip_count, row_start
 from motionary.pipeline.clustering.cut import LevelScores, best_level, merge_heights
 
 
@@ -54,13 +54,14 @@ def modularity_cut(Z: NDArray[np.float64], distances_condensed: ArrayLike) -> Le
     return best_level(Z, kappa, _modularity_of_levels(Z, graph)[1:-1])
 
 
-def nearest_neighbour_graph(distances_condensed: NDArray[np.float64]) -> list[dict[int, float]]:
+def nearest_neighbour_graph(distances_condensed: NDArray[np.floating]) -> list[dict[int, float]]:
     """Build the weighted graph of nearest neighbours.
 
     Parameters
     ----------
     distances_condensed : array (N(N-1)/2,)
-        Distances of N >= 2 clips. Of equally near clips the one of lower index comes first.
+        Finite distances of N >= 2 clips, read once from end to end. Of equally near clips the one of lower
+        index comes first.
 
     Returns
     -------
@@ -69,7 +70,7 @@ def nearest_neighbour_graph(distances_condensed: NDArray[np.float64]) -> list[di
     """
     clips = clip_count(distances_condensed)
     count = min(int(np.ceil(np.log2(clips))), clips - 1)
-    nearest = [_nearest(distances_condensed, clips, clip, count) for clip in range(clips)]
+    nearest = _nearest(distances_condensed, clips, count).tolist()
     hoods = [{clip, *others} for clip, others in enumerate(nearest)]
     graph: list[dict[int, float]] = [{} for _ in range(clips)]
     for clip, others in enumerate(nearest):
@@ -79,11 +80,16 @@ def nearest_neighbour_graph(distances_condensed: NDArray[np.float64]) -> list[di
     return graph
 
 
-def _nearest(distances: NDArray[np.float64], clips: int, clip: int, count: int) -> list[int]:
-    row = distances_of(clip, distances, clips)
-    near = np.flatnonzero(row <= np.partition(row, count - 1)[count - 1])
-    chosen: list[int] = near[np.argsort(row[near], kind="stable")[:count]].tolist()
-    return chosen
+def _nearest(distances: NDArray[np.floating], clips: int, count: int) -> NDArray[np.int64]:
+    """Return the `count` nearest others (N, count) of every clip, the nearest first."""
+    from motionary.pipeline.clustering.condensed_kernels import take_row
+
+    nearest = np.full((clips, count), -1)
+    near = np.full((clips, count), np.inf)
+    for clip in range(clips - 1):
+        start = row_start(clip, clips)
+        take_row(clip, distances[start : start + clips - clip - 1].astype(np.float64), nearest, near)
+    return nearest
 
 
 def _modularity_of_levels(Z: NDArray[np.float64], graph: list[dict[int, float]]) -> NDArray[np.float64]:

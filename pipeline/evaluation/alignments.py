@@ -13,6 +13,7 @@ import numpy as np
 from motionary.pipeline.alignment.correlation import mean_correlation
 from motionary.pipeline.alignment.trajectories import roughness
 from motionary.pipeline.alignment.warp import Warp
+from motionary.pipeline.alignment.weights import varying_dofs
 from motionary.pipeline.evaluation.paths import longest_stay, path_deviation
 from motionary.pipeline.evaluation.trajectories import mean_distance
 from motionary.pipeline.motion import FloatArray
@@ -72,10 +73,10 @@ def alignment_scores(
         Shapes disagree or a value is not finite, or a warp is of other lengths.
     """
     warped = warp.apply(moving)
-    moves = (np.ptp(moving, axis=0) > 0) | (np.ptp(reference, axis=0) > 0)
+    moves = varying_dofs([moving, reference])
     shown = np.stack([warp.source_time.round(_SAME_TIME), np.arange(len(reference))], axis=1)
     return AlignmentScores(
-        correlation=mean_correlation(warped, reference, moves.astype(float)) if moves.any() else None,
+        correlation=mean_correlation(warped, reference, moves) if moves.any() else None,
         distance=mean_distance(warped, reference),
         from_dtw=path_deviation(warp.source_time, plain.source_time) / rate,
         longest_still=longest_stay(shown) / rate,

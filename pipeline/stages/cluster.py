@@ -1,25 +1,38 @@
-"""All pairs -> dendrograms, cuts, and the clusters that are published [DC 5]."""
+"""All pairs -> dendrograms, cuts, and the clusters that are published [DC 5].
+
+Pairs are read part by part, once for each distance, into arrays in temporary files. Mapped at a time are
+6 N^2 bytes at most for one distance (float32, and Ward's working copy) and 8 N^2 for the fuzzy one: 3.2 GB
+for 20,000 clips, which the system may write out and take back. Of the process's own memory it takes N^2 / 16
+bytes, a part of the pairs, and what grows with N alone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from motionary.pipeline.clustering import Cut, choose_cut, cut_tree, fuzzy_linkage, labels_suffice
+from motionary.pipeline.clustering.condensed import blocks
 from motionary.pipeline.clustering.linkage import LINKAGES
+from motionary.pipeline.clustering.mapped import mapped_array
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.evaluation import adjusted_rand_index, best_reward_punish, reward_punish
-from motionary.pipeline.stages.columns import condensed, condensed_places
+from motionary.pipeline.parts import Parts
+from motionary.pipeline.stages.columns import mapped_distances
 from motionary.pipeline.tables import LABEL_COLUMNS, TABLES
 
 VERSION = 2
 MAKES = ("clips", "linkage", "partitions", "cuts", "groups")
 
 _METRICS = ("dtw", "b_dtw", "weighted")
+
+Classes = Sequence[str | None] | None
+"""The label of every clip, None where it has none; None where no clip has one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,23 +43,23 @@ class Dendrogram:
     ----------
     method, metric : str
         Linkage and distance.
-    distances : array (N (N - 1) / 2,)
-        What the linkage works on, condensed; for fuzzy linkage its merge key.
     linkage : array (N - 1, 4)
         SciPy linkage matrix.
     cut : Cut
         Automatic, labels hidden; by the modularity of this distance's own nearest-neighbour graph.
+    published : Cut or None
+        Of the dendrogram whose clusters are published, the cut that the configuration asks for.
     """
 
     method: str
     metric: str
-    distances: NDArray[np.float64]
     linkage: NDArray[np.float64]
     cut: Cut
+    published: Cut | None
 
 
 def cluster(
-    ingested: pa.Table, pairs: pa.Table, labels: pa.Table, overrides: pa.Table, config: ClusterConfig
+    ingested: pa.Table, pairs: Parts, labels: pa.Table, overrides: pa.Table, config: ClusterConfig
 ) -> dict[str, pa.Table]:
     """Cluster the clips of a library by all distances and linkages, and publish one of the partitions.
 
@@ -54,7 +67,7 @@ def cluster(
     ----------
     ingested : pyarrow.Table
         Every clip.
-    pairs : pyarrow.Table
+    pairs : Parts
         Every pair of them.
     labels : pyarrow.Table
         clip_id and text columns; clips without a row have no supplied labels.
@@ -72,21 +85,17 @@ def cluster(
     clips = join_labels(ingested.sort_by("clip_id"), labels)
     if len(clips) == 0:
         return {name: TABLES[name].empty_table() for name in MAKES} | {"clips": clips}
-    classes = _classes(clips, overrides, config.label_column)
-    dendrograms = _dendrograms(clips["clip_id"], pairs, config)
-    primary = next(one for one in dendrograms if _is_primary(one, config))
-    published = choose_cut(primary.linkage, primary.distances, config, labels=classes)
+    classes = classes_of(clips, overrides, config.label_column)
+    dendrograms = _dendrograms(clips["clip_id"], pairs, config, classes)
+    published = next(one.published for one in dendrograms if one.published is not None)
     return {
         "clips": clips,
         "linkage": pa.concat_tables([_linkage_rows(one) for one in dendrograms]),
-        "partitions": pa.concat_tables([_partition_rows(one, clips["clip_id"]) for one in dendrograms]),
-        "cuts": pa.concat_tables(
-            [_cut_row(one, classes, published if one is primary else None) for one in dendrograms]
+        "partitions": pa.concat_tables(
+            [partition_rows(one.method, one.metric, clips["clip_id"], one.cut.labels) for one in dendrograms]
         ),
-        "groups": pa.table(
-            {"clip_id": clips["clip_id"], "group": pa.array(published.labels, pa.int32())},
-            schema=TABLES["groups"],
-        ),
+        "cuts": pa.concat_tables([_cut_row(one, classes) for one in dendrograms]),
+        "groups": groups_table(clips["clip_id"], published.labels),
     }
 
 
@@ -103,7 +112,8 @@ def own_overrides(clips: pa.Table, overrides: pa.Table) -> list[str | None]:
     return [named.get(clip_id) for clip_id in clips["clip_id"].to_pylist()]
 
 
-def _classes(clips: pa.Table, overrides: pa.Table, column: str) -> list[str | None] | None:
+def classes_of(clips: pa.Table, overrides: pa.Table, column: str) -> Classes:
+    """Return what every clip is called: by a person, else by its label; None where none has a name."""
     both = zip(own_labels(clips, column), own_overrides(clips, overrides), strict=True)
     classes = [label if override is None else override for label, override in both]
     return classes if any(one is not None for one in classes) else None
@@ -123,30 +133,48 @@ def join_labels(ingested: pa.Table, labels: pa.Table) -> pa.Table:
     return clips
 
 
-def _dendrograms(clip_ids: pa.ChunkedArray, pairs: pa.Table, config: ClusterConfig) -> list[Dendrogram]:
-    made = []
-    place = condensed_places(pairs, clip_ids)
-    for metric in _METRICS:
-        distances = condensed(pairs, metric, place)
-        for method in dict.fromkeys(("complete", "ward", config.primary)):
-            if method in LINKAGES:
-                made.append(_dendrogram(method, metric, distances, LINKAGES[method](distances), config))
-    low, high = (condensed(pairs, name, place) for name in ("fuzzy_low", "fuzzy_high"))
-    key = low + config.fuzzy_tau * (high - low)
-    made.append(_dendrogram("fuzzy", "fuzzy", key, fuzzy_linkage(low, high, tau=config.fuzzy_tau), config))
+def _dendrograms(
+    clip_ids: pa.ChunkedArray, pairs: Parts, config: ClusterConfig, classes: Classes
+) -> list[Dendrogram]:
+    made = [one for metric in _METRICS for one in _by_one_distance(metric, clip_ids, pairs, config, classes)]
+    low, high = mapped_distances(pairs, ("fuzzy_low", "fuzzy_high"), clip_ids)
+    linkage = fuzzy_linkage(low, high, config.fuzzy_tau, mapped_array)
+    made.append(_cut("fuzzy", "fuzzy", linkage, _merge_key(low, high, config.fuzzy_tau), config, classes))
     return made
 
 
-def _dendrogram(
-    method: str, metric: str, distances: NDArray, linkage: NDArray, config: ClusterConfig
+def _by_one_distance(
+    metric: str, clip_ids: pa.ChunkedArray, pairs: Parts, config: ClusterConfig, classes: Classes
+) -> list[Dendrogram]:
+    (distances,) = mapped_distances(pairs, (metric,), clip_ids)
+    methods = [one for one in dict.fromkeys(("complete", "ward", config.primary)) if one in LINKAGES]
+    return [
+        _cut(method, metric, LINKAGES[method](distances, mapped_array), distances, config, classes)
+        for method in methods
+    ]
+
+
+def _merge_key(low: NDArray, high: NDArray, tau: float) -> NDArray[np.float64]:
+    key = mapped_array(low.shape, np.float64)
+    for block in blocks(len(key)):
+        least = low[block].astype(np.float64)
+        key[block] = least + tau * (high[block] - least)
+    return key
+
+
+def _cut(
+    method: str, metric: str, linkage: NDArray, distances: NDArray, config: ClusterConfig, classes: Classes
 ) -> Dendrogram:
     # A threshold or a count is asked of the published clusters; the others have heights of their own.
     automatic = replace(config, threshold=None, n_clusters=None)
-    return Dendrogram(method, metric, distances, linkage, choose_cut(linkage, distances, automatic))
-
-
-def _is_primary(dendrogram: Dendrogram, config: ClusterConfig) -> bool:
-    return dendrogram.method == config.primary and dendrogram.metric in (config.metric, "fuzzy")
+    is_published = method == config.primary and metric in (config.metric, "fuzzy")
+    return Dendrogram(
+        method,
+        metric,
+        linkage,
+        choose_cut(linkage, distances, automatic),
+        choose_cut(linkage, distances, config, labels=classes) if is_published else None,
+    )
 
 
 def _linkage_rows(dendrogram: Dendrogram) -> pa.Table:
@@ -164,18 +192,25 @@ def _linkage_rows(dendrogram: Dendrogram) -> pa.Table:
     return pa.table(columns, schema=TABLES["linkage"])
 
 
-def _partition_rows(dendrogram: Dendrogram, clip_ids: pa.ChunkedArray) -> pa.Table:
+def partition_rows(method: str, metric: str, clip_ids: pa.ChunkedArray, labels: NDArray) -> pa.Table:
+    """Write the cluster of every clip as rows of `partitions`."""
     columns = {
-        "method": [dendrogram.method] * len(clip_ids),
-        "metric": [dendrogram.metric] * len(clip_ids),
+        "method": [method] * len(clip_ids),
+        "metric": [metric] * len(clip_ids),
         "clip_id": clip_ids,
-        "cluster": dendrogram.cut.labels.astype(np.int32),
+        "cluster": labels.astype(np.int32),
     }
     return pa.table(columns, schema=TABLES["partitions"])
 
 
-def _cut_row(dendrogram: Dendrogram, classes: Sequence[str | None] | None, published: Cut | None) -> pa.Table:
-    cut = dendrogram.cut
+def groups_table(clip_ids: pa.ChunkedArray, labels: NDArray) -> pa.Table:
+    """Write the published cluster of every clip as `groups`."""
+    columns = {"clip_id": clip_ids, "group": pa.array(labels, pa.int32())}
+    return pa.table(columns, schema=TABLES["groups"])
+
+
+def _cut_row(dendrogram: Dendrogram, classes: Classes) -> pa.Table:
+    cut, published = dendrogram.cut, dendrogram.published
     row = {
         "method": dendrogram.method,
         "metric": dendrogram.metric,
@@ -196,15 +231,23 @@ def _cut_row(dendrogram: Dendrogram, classes: Sequence[str | None] | None, publi
             "strip_low": cut.widest.mu_low,
             "strip_high": cut.widest.mu_high,
         }
-    if classes is not None and labels_suffice(classes):
-        known = len({one for one in classes if one is not None})
-        at_true = cut_tree(dendrogram.linkage, n_clusters=known)
+    row |= scores(cut.labels, classes)
+    if "classes" in row:
+        at_true = cut_tree(dendrogram.linkage, n_clusters=row["classes"])
         row |= {
-            "reward_punish": reward_punish(cut.labels, classes),
-            "reward_punish_best": best_reward_punish(classes),
-            "ari": adjusted_rand_index(cut.labels, classes),
-            "classes": known,
             "reward_punish_true": reward_punish(at_true, classes),
             "ari_true": adjusted_rand_index(at_true, classes),
         }
     return pa.Table.from_pylist([row], schema=TABLES["cuts"])
+
+
+def scores(labels: NDArray, classes: Classes) -> dict[str, Any]:
+    """Score a partition against what the clips are called; nothing where too few have a name."""
+    if classes is None or not labels_suffice(classes):
+        return {}
+    return {
+        "reward_punish": reward_punish(labels, classes),
+        "reward_punish_best": best_reward_punish(classes),
+        "ari": adjusted_rand_index(labels, classes),
+        "classes": len({one for one in classes if one is not None}),
+    }

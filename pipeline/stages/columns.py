@@ -7,10 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from motionary.pipeline.clustering.condensed import places_of
+from motionary.pipeline.clustering.condensed import pair_at, places_of
+from motionary.pipeline.clustering.mapped import mapped_array
+from motionary.pipeline.parts import Parts
 
 
 def vectors(rows: NDArray) -> pa.Array:
@@ -73,6 +74,48 @@ def carried_rows(
     return found
 
 
+def places_by_clip(clip_ids: pa.Array | pa.ChunkedArray) -> dict[str, int]:
+    """Return where every clip stands among the clips."""
+    return {clip_id: place for place, clip_id in enumerate(clip_ids.to_pylist())}
+
+
+def pair_places(pairs: pa.Table, places: Mapping[str, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find which clips pairs are of.
+
+    Parameters
+    ----------
+    pairs : pyarrow.Table
+        With clip_a and clip_b; a part of the pairs or all of them. As dictionaries they take the least time.
+    places : mapping of str to int
+        Where every clip stands, see `places_by_clip`.
+
+    Returns
+    -------
+    a, b : array (pairs,)
+        The places of clip_a and of clip_b; either may be the smaller.
+
+    Raises
+    ------
+    ValueError
+        A pair is of a clip that has no place.
+    """
+    return _places_in(pairs["clip_a"], places), _places_in(pairs["clip_b"], places)
+
+
+def _places_in(column: pa.ChunkedArray, places: Mapping[str, int]) -> NDArray[np.int64]:
+    """Find the place of every value of a column; each chunk looks its few different values up."""
+    found = [np.empty(0, dtype=np.int64)]
+    for chunk in column.chunks:
+        codes = chunk.dictionary_encode()
+        names = codes.dictionary.to_pylist()
+        known = np.array([places.get(name, -1) for name in names], dtype=np.int64)
+        found.append(known[codes.indices.to_numpy(zero_copy_only=False)])
+        if (found[-1] < 0).any():
+            unknown = chunk[int(np.argmin(found[-1]))].as_py()
+            raise ValueError(f"{unknown} has pairs and is not among the {len(places)} clips")
+    return np.concatenate(found)
+
+
 def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> NDArray[np.int64]:
     """Find where each row of a table of pairs stands in SciPy's condensed order.
 
@@ -96,19 +139,8 @@ def condensed_places(pairs: pa.Table, clip_ids: pa.Array | pa.ChunkedArray) -> N
     size = count * (count - 1) // 2
     if len(pairs) != size:
         raise ValueError(f"{count} clips have {size} pairs; the table has {len(pairs)}")
-    ids = clip_ids.combine_chunks() if isinstance(clip_ids, pa.ChunkedArray) else clip_ids
-    a, b = (_places_in(ids, pairs[side]) for side in ("clip_a", "clip_b"))
+    a, b = pair_places(pairs, places_by_clip(clip_ids))
     return places_of(np.minimum(a, b), np.maximum(a, b), count)
-
-
-def _places_in(ids: pa.Array, column: pa.ChunkedArray) -> NDArray[np.int64]:
-    """Find the place of every value of a column; each chunk looks its few different values up."""
-    places = [np.empty(0, dtype=np.int64)]
-    for chunk in column.chunks:
-        codes = chunk.dictionary_encode()
-        known = pc.index_in(codes.dictionary, ids).to_numpy(zero_copy_only=False).astype(np.int64)
-        places.append(known[codes.indices.to_numpy(zero_copy_only=False)])
-    return np.concatenate(places)
 
 
 def condensed(pairs: pa.Table, column: str, places: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -116,3 +148,62 @@ def condensed(pairs: pa.Table, column: str, places: NDArray[np.int64]) -> NDArra
     distances = np.empty(len(places))
     distances[places] = pairs[column].to_numpy()
     return distances
+
+
+def mapped_distances(
+    pairs: Parts, columns: Sequence[str], clip_ids: pa.Array | pa.ChunkedArray
+) -> list[NDArray[np.float32]]:
+    """Lay distances out in SciPy's condensed order, in temporary files; the parts are read once.
+
+    Parameters
+    ----------
+    pairs : Parts
+        With clip_a, clip_b and distances: every pair of the clips once, in any order.
+    columns : sequence of str
+        The distances.
+    clip_ids : array (N,)
+        The clips, in the order that the condensed arrays are to follow.
+
+    Returns
+    -------
+    list of array (N (N - 1) / 2,)
+        One a column: 2 N^2 bytes each, see `motionary.pipeline.clustering.mapped`. The process's own memory
+        is N^2 / 16 bytes and a part.
+
+    Raises
+    ------
+    ValueError
+        A pair is missing or stands twice, or is of a clip that is not among them; the message names it.
+    """
+    from motionary.pipeline.clustering.condensed_kernels import first_repeated
+
+    count = len(clip_ids)
+    size = count * (count - 1) // 2
+    distances = [mapped_array((size,), np.float32) for _ in columns]
+    seen = np.zeros(size // 8 + 1, np.uint8)
+    place_of, rows = places_by_clip(clip_ids), 0
+    for part in pairs.read(["clip_a", "clip_b", *columns]):
+        a, b = pair_places(part, place_of)
+        _refuse((a == b).argmax() if (a == b).any() else -1, part, "is of one clip")
+        where = places_of(np.minimum(a, b), np.maximum(a, b), count)
+        _refuse(first_repeated(seen, where), part, "stands twice")
+        for array, column in zip(distances, columns, strict=True):
+            array[where] = part[column].to_numpy()
+        rows += len(part)
+    if rows < size:
+        first, second = pair_at(_first_unset(seen), count)
+        raise ValueError(
+            f"{count} clips have {size} pairs; there are {rows}, and that of {clip_ids[first]} and "
+            f"{clip_ids[second]} is missing"
+        )
+    return distances
+
+
+def _refuse(row: int, pairs: pa.Table, fault: str) -> None:
+    if row >= 0:
+        raise ValueError(f"the pair of {pairs['clip_a'][row]} and {pairs['clip_b'][row]} {fault}")
+
+
+def _first_unset(bits: NDArray[np.uint8]) -> int:
+    byte = int(np.argmax(bits != 0xFF))
+    return 8 * byte + int(np.argmin(np.unpackbits(bits[byte : byte + 1], bitorder="little")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -26,16 +27,19 @@ def compare(
     first: pa.Table,
     second: pa.Table,
     config: DistanceConfig,
+    most: float | None = None,
     carried: Sequence[tuple[dict[str, pa.Table], Block]] = (),
 ) -> dict[str, pa.Table]:
-    """Compute every distance between the clips of two batches.
+    """Compute every distance between the clips of two sides.
 
     Parameters
     ----------
     first, second : pyarrow.Table
-        `resampled` of two batches, or twice of one; a pair of clips is compared once.
+        `resampled` of two sides, or twice of one; a pair of clips is compared once.
     config : DistanceConfig
         The thresholds.
+    most : float, optional
+        mu: pairs whose weighted distance is greater are left out.
     carried : sequence of (tables, Block)
         Earlier results that hold some of the pairs.
 
@@ -45,17 +49,20 @@ def compare(
         `pairs`.
     """
     one, other = _distinct(first), _distinct(second)
+    wanted = _Wanted(thresholds_of(config), np.float64(np.inf if most is None else most))
     values, known = _carried(one.names, other.names, carried)
     if one.clip_ids == other.clip_ids:
-        _compute_within(values, known, one.clips, config)
+        _compute_within(values, known, one.clips, wanted)
         i, j = np.triu_indices(len(one.clip_ids), 1)
         twins = one.place[i[one.place[i] == one.place[j]]]
         for itself in np.unique(twins):
             alone = np.array([itself])
-            _compare(values, alone, alone, one.clips, one.clips, config)
+            _compare(values, alone, alone, one.clips, one.clips, wanted)
     else:
-        _compute_between(values, known, one.clips, other.clips, config)
+        _compute_between(values, known, one.clips, other.clips, wanted)
         i, j = np.indices((len(one.clip_ids), len(other.clip_ids))).reshape(2, -1)
+    near = values["weighted"][one.place[i], other.place[j]] <= wanted.most
+    i, j = i[near], j[near]
     a, b = (pa.array(side.clip_ids, pa.string()).take(pa.array(k)) for side, k in ((one, i), (other, j)))
     in_order = pc.less(a, b)
     columns = {"clip_a": pc.if_else(in_order, a, b), "clip_b": pc.if_else(in_order, b, a)}
@@ -69,9 +76,16 @@ def compare(
     return {"pairs": pa.table(columns, schema=TABLES["pairs"])}
 
 
+class _Wanted(NamedTuple):
+    """The lambdas of the curve, and the weighted distance up to which pairs are wanted; infinite: all."""
+
+    thresholds: tuple[float, ...]
+    most: np.float64  # a plain float would be rounded to the distances' float32 where the two are compared
+
+
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """A batch: its clips, and of those with equal frames the first, which stands for the others.
+    """A side: its clips, and of those with equal frames the first, which stands for the others.
 
     `place` says of every clip which of `names` and `clips` stands for it.
     """
@@ -104,18 +118,19 @@ def _distances() -> list[str]:
 def _carried(
     ids: Sequence[str], other_ids: Sequence[str], carried: Sequence[tuple[dict[str, pa.Table], Block]]
 ) -> tuple[Values, NDArray[np.bool_]]:
-    """Lay out what earlier results hold, and say which pairs those are."""
+    """Lay out what earlier results hold, and say which pairs those are; infinite is what was left out."""
     shape = (len(ids), len(other_ids))
     width = TABLES["pairs"].field("curve").type.list_size
     values = {
         name: np.zeros((*shape, width) if name == "curve" else shape, np.float32) for name in _distances()
     }
+    values["weighted"].fill(np.inf)
     known = np.zeros(shape, dtype=bool)
     for tables, block in carried:
         pairs = tables["pairs"]
-        rows = _rows(
-            pairs, [block.first.get(one, "") for one in ids], [block.second.get(one, "") for one in other_ids]
-        )
+        firsts = np.array([block.first.get(one, "") for one in ids], dtype=object)
+        seconds = np.array([block.second.get(one, "") for one in other_ids], dtype=object)
+        rows = _rows(pairs, firsts, seconds)
         here = rows >= 0
         taken = pairs.take(pa.array(rows[here]))
         for name, value in values.items():
@@ -123,7 +138,8 @@ def _carried(
             value[here] = (
                 column.flatten().to_numpy().reshape(-1, width) if name == "curve" else column.to_numpy()
             )
-        known |= here
+        # What the block spans and does not hold was too far; but a clip is not compared with itself there.
+        known |= np.outer(firsts != "", seconds != "") & (firsts[:, None] != seconds)
     return values, known
 
 
@@ -146,39 +162,45 @@ def _compute_between(
     known: NDArray[np.bool_],
     clips: Sequence[NDArray],
     others: Sequence[NDArray],
-    config: DistanceConfig,
+    wanted: _Wanted,
 ) -> None:
-    """Compute the unknown pairs of two batches: together those columns that lack the same rows."""
+    """Compute the unknown pairs of two sides: together those columns that lack the same rows."""
     lacking, group_of = np.unique(~known, axis=1, return_inverse=True)
     for group, lacks in enumerate(lacking.T):
         columns = np.flatnonzero(group_of.reshape(-1) == group)
-        _compare(values, np.flatnonzero(lacks), columns, clips, others, config)
+        _compare(values, np.flatnonzero(lacks), columns, clips, others, wanted)
 
 
 def _compute_within(
-    values: Values, known: NDArray[np.bool_], clips: Sequence[NDArray], config: DistanceConfig
+    values: Values, known: NDArray[np.bool_], clips: Sequence[NDArray], wanted: _Wanted
 ) -> None:
-    """Compute the pairs of one batch that are not known; the part above the diagonal counts."""
+    """Compute the pairs of one side that are not known; the part above the diagonal counts."""
     other_way = known.T & ~known
     for value in values.values():
         value[other_way] = np.swapaxes(value, 0, 1)[other_way]
     known = known | known.T
     new = np.flatnonzero(~known.any(axis=1))
     old = np.flatnonzero(known.any(axis=1))
-    _compare(values, old, new, clips, clips, config)
+    _compare(values, old, new, clips, clips, wanted)
     for name in values:
         values[name][np.ix_(new, old)] = np.swapaxes(values[name][np.ix_(old, new)], 0, 1)
     # Among the old ones a pair is missing only where an earlier result had one clip under two names.
     lacking = old[(~known[np.ix_(old, old)]).sum(axis=1) > 1]
     for some in (new, lacking):
-        _among(values, some, clips, config)
+        _among(values, some, clips, wanted)
 
 
-def _among(values: Values, some: NDArray[np.intp], clips: Sequence[NDArray], config: DistanceConfig) -> None:
+def _among(values: Values, some: NDArray[np.intp], clips: Sequence[NDArray], wanted: _Wanted) -> None:
     from motionary.pipeline.distances import pairwise_distances
+    from motionary.pipeline.distances.pruned import pairwise_under
 
-    found = pairwise_distances([clips[k] for k in some], n_jobs=1, thresholds=thresholds_of(config))
-    i, j = np.triu_indices(len(some), 1)
+    chosen = [clips[k] for k in some]
+    if np.isinf(wanted.most):
+        found = pairwise_distances(chosen, n_jobs=1, thresholds=wanted.thresholds)
+        i, j = np.triu_indices(len(some), 1)
+    else:
+        near = pairwise_under(chosen, wanted.most, wanted.thresholds)
+        found, i, j = near.distances, near.first, near.second
     for name, value in values.items():
         value[some[i], some[j]] = value[some[j], some[i]] = getattr(found, name)
 
@@ -189,15 +211,22 @@ def _compare(
     columns: NDArray[np.intp],
     clips: Sequence[NDArray],
     others: Sequence[NDArray],
-    config: DistanceConfig,
+    wanted: _Wanted,
 ) -> None:
     from motionary.pipeline.distances import compare_clips
+    from motionary.pipeline.distances.pruned import compare_under
 
     if not (len(rows) and len(columns)):
         return
-    found = compare_clips([clips[k] for k in rows], [others[k] for k in columns], thresholds_of(config))
-    for name in values:
-        values[name][np.ix_(rows, columns)] = getattr(found, name)
+    one, other = [clips[k] for k in rows], [others[k] for k in columns]
+    if np.isinf(wanted.most):
+        found = compare_clips(one, other, wanted.thresholds)
+        for name in values:
+            values[name][np.ix_(rows, columns)] = getattr(found, name)
+    else:
+        near = compare_under(one, other, wanted.most, wanted.thresholds)
+        for name in values:
+            values[name][rows[near.first], columns[near.second]] = getattr(near.distances, name)
 
 
 def thresholds_of(config: DistanceConfig) -> tuple[float, ...]:

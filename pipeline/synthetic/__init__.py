@@ -11,9 +11,13 @@ from motionary.pipeline.synthetic.bodies import BODIES, DEFAULT_BODY
 from motionary.pipeline.synthetic.conventions import CONVENTIONS
 from motionary.pipeline.synthetic.files import write_library
 from motionary.pipeline.synthetic.library import (
+    CLIPS,
     TEMPLATE_FPS,
     SyntheticTake,
+    least_clips,
+    numbered_take,
     synthetic_library,
+    take_numbers,
     template,
     template_frames,
 )
@@ -23,13 +27,17 @@ from motionary.pipeline.synthetic.styles import STYLES
 __all__ = [
     "ACTIONS",
     "BODIES",
+    "CLIPS",
     "CONVENTIONS",
     "DEFAULT_BODY",
     "STYLES",
     "TEMPLATE_FPS",
     "SyntheticTake",
+    "least_clips",
+    "numbered_take",
     "style_takes",
     "synthetic_library",
+    "take_numbers",
     "template",
     "template_frames",
     "write_library",

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -24,6 +25,10 @@ from motionary.pipeline.synthetic.posture import Posture, mirrored, placed, pose
 from motionary.pipeline.synthetic.styles import NEUTRAL, STYLES, Style, apply, personal
 
 TEMPLATE_FPS = 30.0
+CLIPS = 80
+"""Of the library that `motionary demo` writes unless told otherwise."""
+_TOGETHER = 100
+"""Take numbers whose files share a folder: 500 files, however large the library."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +64,9 @@ class SyntheticTake:
 
     @property
     def path(self) -> str:
-        """The take's file in a written library, with forward slashes."""
-        return f"{self.action}/{self.motion.name}.bvh"
+        """The take's file in a written library, with forward slashes; from take 100 on by hundreds."""
+        hundreds = self.take // _TOGETHER * _TOGETHER
+        return f"{self.action}/{f'{hundreds}/' if hundreds else ''}{self.motion.name}.bvh"
 
     @property
     def description(self) -> str:
@@ -124,28 +130,66 @@ def synthetic_library(seed: int = 0, takes: int = 2) -> list[SyntheticTake]:
     """
     if takes < 1:
         raise ValueError(f"takes is {takes}; it must be at least 1")
-    return list(_takes(seed, takes))
+    return [numbered_take(seed, *one) for one in take_numbers(takes * len(ACTIONS) * len(STYLES))]
 
 
-def _takes(seed: int, takes: int) -> Iterator[SyntheticTake]:
+def take_numbers(clips: int) -> Iterator[tuple[str, str, int]]:
+    """List the takes of a library of any size; a larger one has those of a smaller one, and more.
+
+    Parameters
+    ----------
+    clips : int
+        Any two actions have as many but for one, and any two styles.
+
+    Yields
+    ------
+    (action, style, take)
+        By action, style and take.
+
+    Raises
+    ------
+    ValueError
+        `clips` is below 1.
+    """
+    if clips < 1:
+        raise ValueError(f"clips is {clips}; it must be at least 1")
+    rounds, rest = divmod(clips, len(ACTIONS) * len(STYLES))
+    for action, style in product(ACTIONS, STYLES):
+        for number in range(1, rounds + (_turn(action, style) < rest) + 1):
+            yield action, style, number
+
+
+def least_clips(action: str, style: str, number: int) -> int:
+    """Return how many clips a library has at least if it has this take."""
+    return (number - 1) * len(ACTIONS) * len(STYLES) + _turn(action, style) + 1
+
+
+def _turn(action: str, style: str) -> int:
+    """Return the place of an action in a style in a round of all: 5 styles and 8 actions go round at once."""
+    a, s = list(ACTIONS).index(action), list(STYLES).index(style)
+    return next(
+        turn for turn in range(a, len(ACTIONS) * len(STYLES), len(ACTIONS)) if turn % len(STYLES) == s
+    )
+
+
+def numbered_take(seed: int, action: str, style: str, number: int) -> SyntheticTake:
+    """Perform one take of the library of a seed, which is the same whatever the library's size."""
     bodies, conventions = tuple(BODIES.values()), tuple(CONVENTIONS.values())
-    for a, action in enumerate(ACTIONS.values()):
-        for s, style in enumerate(STYLES.values()):
-            for number in range(1, takes + 1):
-                plain = style == NEUTRAL and number == 1
-                rng = np.random.default_rng([seed, a, s, number])
-                # Remainders by 2, 3 and 5 mix skeletons, rates, hands and bodies evenly, whatever the seed.
-                yield perform_take(
-                    action,
-                    style if plain else personal(style, rng),
-                    DEFAULT_BODY if plain else bodies[(a + 2 * s + number) % len(bodies)],
-                    conventions[(a + s + number) % len(conventions)],
-                    fps=60.0 if (a + s + number) % 3 == 0 else 30.0,
-                    is_mirrored=not plain and (2 * a + 2 * s + number) % 5 == 4,
-                    start=rng.uniform(0.0, 1.0 - action.taken / action.cycles),
-                    number=number,
-                    rng=rng,
-                )
+    a, s = list(ACTIONS).index(action), list(STYLES).index(style)
+    plain = STYLES[style] == NEUTRAL and number == 1
+    rng = np.random.default_rng([seed, a, s, number])
+    # Remainders by 2, 3 and 5 mix skeletons, rates, hands and bodies evenly, whatever the seed.
+    return perform_take(
+        ACTIONS[action],
+        STYLES[style] if plain else personal(STYLES[style], rng),
+        DEFAULT_BODY if plain else bodies[(a + 2 * s + number) % len(bodies)],
+        conventions[(a + s + number) % len(conventions)],
+        fps=60.0 if (a + s + number) % 3 == 0 else 30.0,
+        is_mirrored=not plain and (2 * a + 2 * s + number) % 5 == 4,
+        start=rng.uniform(0.0, 1.0 - ACTIONS[action].taken / ACTIONS[action].cycles),
+        number=number,
+        rng=rng,
+    )
 
 
 def perform_take(

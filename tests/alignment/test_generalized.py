@@ -296,8 +296,10 @@ def test_what_cannot_be_aligned_is_refused(second: np.ndarray, options: dict, pr
 
 def test_the_time_step_refuses_what_does_not_fit() -> None:
     basis = monotone_basis({"tanh": 2}, 5, 8)
-    with pytest.raises(ValueError, match="1 sequences and 1 bases"):
+    with pytest.raises(ValueError, match="there are 1 sequences"):
         time_step([np.eye(5)], [basis])
+    with pytest.raises(ValueError, match="2 sequences and 1 bases"):
+        time_step([np.eye(5), np.eye(5)], [basis])
     with pytest.raises(ValueError, match="sequence 1 has 4 frames, its basis is for 5"):
         time_step([np.eye(5), np.eye(4)], [basis, basis])
     with pytest.raises(ValueError, match="sequence 1 has 2 dimensions and sequence 0 5"):

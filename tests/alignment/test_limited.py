@@ -72,6 +72,14 @@ def test_weights_are_of_squared_differences() -> None:
         limited_dtw(moving, reference, np.ones(2))
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e-170, 1e140])
+def test_the_unit_changes_nothing(size: float) -> None:
+    rng = np.random.default_rng(3)
+    moving, reference = rng.normal(size=(31, 3)).cumsum(axis=0), rng.normal(size=(37, 3)).cumsum(axis=0)
+    found = limited_dtw(size * moving, size * reference).path
+    np.testing.assert_array_equal(found, limited_dtw(moving, reference).path)
+
+
 def test_what_would_fill_the_memory_is_refused() -> None:
     long = np.zeros((20_000, 1))
     with pytest.raises(

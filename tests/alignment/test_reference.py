@@ -65,10 +65,11 @@ def test_index_of_five_hundred_clips_stays_finite() -> None:
     np.testing.assert_allclose(index, expected, rtol=1e-9)
 
 
-def test_index_does_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("limit", "value"), [("_BLOCK", 5), ("_BLOCK_VALUES", 23 * 4), ("_BLOCK_VALUES", 1)])
+def test_index_does_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch, limit: str, value: int) -> None:
     clips = family(23, 12, 2, noise=0.5)
     whole = similarity_index(clips)
-    monkeypatch.setattr("motionary.pipeline.alignment.reference._BLOCK", 5)
+    monkeypatch.setattr(f"motionary.pipeline.alignment.reference.{limit}", value)
     np.testing.assert_allclose(similarity_index(clips), whole, rtol=1e-12)
     lonely = np.stack([np.eye(23)[i][:, None] for i in range(23)])
     lonely[:, 0] = 0

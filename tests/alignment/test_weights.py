@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from motionary.pipeline.alignment import PRESETS, joint_weights
+from motionary.pipeline.alignment.weights import varying_dofs
 
 JOINTS = (
     "pelvis spine chest neck head "
@@ -64,3 +65,11 @@ def test_any_joints_and_columns() -> None:
 def test_unknown_names_and_weights_are_refused(weights: object, problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         joint_weights(weights)
+
+
+def test_what_moves_in_no_sequence_weighs_nothing() -> None:
+    still, left, right = np.full((4, 3), 0.1), np.eye(3), np.diag([0.0, 0.0, 2.0])
+    right[:, 0] = 5.0
+    assert varying_dofs([still, left[:, [0, 0, 0]] * [1, 0, 0]]).tolist() == [1, 0, 0]
+    assert varying_dofs([right, left * [1, 0, 0]]).tolist() == [1, 0, 1]
+    assert varying_dofs([still]).tolist() == [0, 0, 0]

@@ -76,6 +76,29 @@ def agglomerate(clips, key):
     return steps
 
 
+def chain(clips, key):
+    """The merges of a nearest-neighbour chain, each by the last clips of its two clusters, sorted by height.
+
+    Of equally near clusters the chain's last link comes first, then the one whose last clip comes first.
+    """
+    clusters, links, merges = {clip: frozenset([clip]) for clip in range(clips)}, [], []
+    while len(clusters) > 1:
+        links = links or [min(clusters)]
+        tip, before = links[-1], links[-2] if len(links) > 1 else None
+        nearest = min(
+            (slot for slot in clusters if slot != tip),
+            key=lambda slot: (key(clusters[tip], clusters[slot]), slot != before, slot),
+        )
+        if nearest != before:
+            links.append(nearest)
+            continue
+        gone, kept = sorted((tip, nearest))
+        merges.append((key(clusters[gone], clusters[kept]), gone, kept))
+        clusters[kept] |= clusters.pop(gone)
+        links = links[:-2]
+    return sorted(merges, key=lambda merge: merge[0])
+
+
 def partition(linkage, kappa):
     """The clusters, as a set of sets, that the first N - kappa merges leave."""
     clips = len(linkage) + 1
@@ -93,13 +116,18 @@ def cluster_count(linkage, threshold):
     return len(linkage) + 1 - sum(height <= threshold for height in linkage[:, 2])
 
 
+def nearest(distance, clips):
+    """For every clip the others that the nearest-neighbour graph joins it to, the nearest first."""
+    count = min(ceil(log2(clips)), clips - 1)
+    return [
+        sorted(set(range(clips)) - {clip}, key=lambda other: (distance[clip, other], other))[:count]
+        for clip in range(clips)
+    ]
+
+
 def neighbour_weights(distance, clips):
     """Weighted adjacency of the nearest-neighbour graph, as a dense table."""
-    count = min(ceil(log2(clips)), clips - 1)
-    hoods = []
-    for clip in range(clips):
-        others = sorted((distance[clip, other], other) for other in range(clips) if other != clip)
-        hoods.append({clip} | {other for _, other in others[:count]})
+    hoods = [{clip, *others} for clip, others in enumerate(nearest(distance, clips))]
     joined = [[i != j and (j in hoods[i] or i in hoods[j]) for j in range(clips)] for i in range(clips)]
     return [
         [len(hoods[i] & hoods[j]) / len(hoods[i] | hoods[j]) if joined[i][j] else 0.0 for j in range(clips)]

@@ -66,6 +66,20 @@ def test_graph_of_nearest_neighbours(library):
     assert_array_equal([[graph[i].get(j, 0.0) for j in range(clips)] for i in range(clips)], weights)
 
 
+@settings(max_examples=50, deadline=None)
+@given(library=libraries(smallest=2, largest=40))
+def test_edges_stand_in_the_order_of_who_asked_and_how_near(library):
+    # Sums over the edges follow it.
+    distances = library[1].astype(np.float32)
+    clips = len(library[0]) + 1
+    expected = [{} for _ in range(clips)]
+    for clip, others in enumerate(naive.nearest(naive.square(distances, clips), clips)):
+        for other in others:
+            expected[clip][other] = expected[other][clip] = True
+    for graph in (nearest_neighbour_graph(distances), nearest_neighbour_graph(distances.astype(np.float64))):
+        assert [[*edges] for edges in graph] == [[*edges] for edges in expected]
+
+
 def test_a_graph_worked_by_hand():
     # Clips at 0, 1, 3, 7: two neighbours each, so the neighbourhoods are 012, 012, 012 and 123.
     graph = nearest_neighbour_graph(pdist(np.array([0.0, 1, 3, 7])[:, None]))

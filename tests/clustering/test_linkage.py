@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.cluster.hierarchy import linkage
 from scipy.spatial.distance import pdist, squareform
 
 from motionary.pipeline.clustering import average_linkage, complete_linkage, fuzzy_linkage, ward_linkage
+from motionary.pipeline.clustering.mapped import mapped_array
 from tests.clustering import naive
 
 METHODS = {
@@ -68,6 +70,40 @@ def test_every_fuzzy_merge_is_the_nearest_pair_of_its_partition(low, seed, tau):
     Z = fuzzy_linkage(low, high, tau)
     clips = len(Z) + 1
     assert_greedy(Z, naive.fuzzy_key(naive.square(low, clips), naive.square(high, clips), tau))
+
+
+def merges_of(Z):
+    """The last clips of the two clusters of every merge, and its height."""
+    last = [*range(len(Z) + 1)]
+    for left, right in Z[:, :2].astype(int):
+        last.append(max(last[left], last[right]))
+        yield tuple(sorted((last[left], last[right])))
+
+
+@settings(max_examples=60, deadline=None)
+@given(clips=st.integers(2, 40), most=st.integers(1, 30), seed=st.integers(0, 2**16))
+def test_ties_are_won_by_the_last_link_and_then_the_lowest_index(clips, most, seed):
+    distances = np.random.default_rng(seed).integers(1, most + 1, math.comb(clips, 2)).astype(np.float32)
+    exact = naive.square(distances, clips)
+    for Z, key in (
+        (complete_linkage(distances), naive.complete_key(exact)),
+        (fuzzy_linkage(distances, distances, 0.5), naive.fuzzy_key(exact, exact, 0.5)),
+    ):
+        assert [*merges_of(Z)] == [(gone, kept) for _, gone, kept in naive.chain(clips, key)]
+
+
+@settings(max_examples=40, deadline=None)
+@given(clips=st.integers(2, 60), tied=st.booleans(), seed=st.integers(0, 2**16))
+def test_float32_and_files_give_the_same_bits(clips, tied, seed):
+    rng = np.random.default_rng(seed)
+    pairs = math.comb(clips, 2)
+    low = (rng.integers(1, 9, pairs) / 3 if tied else rng.random(pairs)).astype(np.float32)
+    high = low + rng.random(pairs, dtype=np.float32)
+    links = [(link, (low,)) for link, _ in METHODS.values()] + [(fuzzy_linkage, (low, high))]
+    for link, ends in links:
+        Z = link(*(end.astype(np.float64) for end in ends))
+        assert_array_equal(link(*ends), Z)
+        assert_array_equal(link(*ends, new_array=mapped_array), Z)
 
 
 def assert_is_agglomeration(Z, key, rooted=False):
@@ -184,6 +220,18 @@ def test_a_wrong_distance_is_named_by_its_clips(wrong, pair, clips):
             link(distances)
     with pytest.raises(ValueError, match=f"low: the distance of clips {clips}"):
         fuzzy_linkage(distances, np.ones(10))
+
+
+@pytest.mark.parametrize("block", [1, 4, 10, 11])
+def test_a_wrong_distance_is_named_whatever_block_it_is_in(monkeypatch, block):
+    monkeypatch.setattr("motionary.pipeline.clustering.condensed._BLOCK", block)
+    for pair, clips in enumerate(combinations(range(5), 2)):
+        distances = np.ones(10, np.float32)
+        distances[pair] = -1
+        with pytest.raises(ValueError, match="clips {} and {} is -1".format(*clips)):
+            complete_linkage(distances)
+        with pytest.raises(ValueError, match=r"clips {} and {} is \[1.0, 0.5\]".format(*clips)):
+            fuzzy_linkage(np.ones(10), np.where(distances < 0, 0.5, 1))
 
 
 def test_arrays_that_are_not_condensed_are_refused():

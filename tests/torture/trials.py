@@ -33,13 +33,13 @@ def none_faulty(tallies: dict[str, Tally]) -> None:
 
 
 def test_damaged_motions_are_read_or_refused(tmp_path: Path) -> None:
-    tallies = fuzz([fuzz_motion.BVH, fuzz_motion.ASF, fuzz_motion.AMC], 120, 7, tmp_path)
+    tallies = fuzz([fuzz_motion.BVH, fuzz_motion.ASF, fuzz_motion.AMC], 60, 7, tmp_path)
     none_faulty(tallies)
     assert all(tally.outcomes["refused"] > tally.outcomes["read"] > 0 for tally in tallies.values())
 
 
 def test_damaged_labels_and_settings_are_read_or_refused(tmp_path: Path) -> None:
-    tallies = fuzz([LABELS, SETTINGS], 100, 7, tmp_path)
+    tallies = fuzz([LABELS, SETTINGS], 50, 7, tmp_path)
     none_faulty(tallies)
     assert all(tally.outcomes["refused"] and tally.outcomes["read"] for tally in tallies.values())
 

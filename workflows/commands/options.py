@@ -30,6 +30,27 @@ OutputFormat = Annotated[
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine.", show_default="one a core")
 ]
+
+
+def _size(text: str) -> int:
+    from motionary.workflows.costs.sizes import parse_size
+
+    try:
+        return parse_size(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+Memory = Annotated[
+    int | None,
+    typer.Option(
+        "--memory",
+        parser=_size,
+        metavar="SIZE",
+        help="What all processes may hold together, as 4GB; with --scheduler, one worker.",
+        show_default="what the machine has",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Answer as JSON.")]
 Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
 

@@ -17,6 +17,7 @@ EXAMPLES = {
         "motionary reproduce adaptive-dtw CATALOG",
         "motionary reproduce assign CATALOG",
         "motionary reproduce style",
+        "motionary reproduce landmarks CATALOG",
     )
 }
 
@@ -33,10 +34,12 @@ def reproduce(
             "style",
             "assign",
             "mutual",
+            "landmarks",
         ],
         typer.Argument(
             metavar="NAME",
-            help="dtw-curve, dtw-curve-better, cotw, gtw, fp-dtw, adaptive-dtw, style, assign or mutual.",
+            help="dtw-curve, dtw-curve-better, cotw, gtw, fp-dtw, adaptive-dtw, style, assign, mutual or "
+            "landmarks.",
         ),
     ],
     catalog: Annotated[
@@ -52,8 +55,8 @@ def reproduce(
             "--draws",
             min=1,
             help="Sets drawn by each rule; for cotw, fp-dtw and adaptive-dtw pairs of each action; for style "
-            "takes of each, for assign partings.",
-            show_default="100, cotw 10, fp-dtw 20, adaptive-dtw 10, style 10, assign 5",
+            "takes of each, for assign partings, for landmarks samples.",
+            show_default="100, cotw 10, fp-dtw 20, adaptive-dtw 10, style 10, assign and landmarks 5",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 0,
@@ -68,7 +71,8 @@ def reproduce(
     default. cotw: which alignment brings clips of one action together. gtw: sequences distorted in time and
     space. fp-dtw: following a live motion. adaptive-dtw: without standing still. style: how well styles are
     told apart by what alignment leaves over, on made-up takes. assign: whether takes that are held out get
-    their names. mutual: whether ranking by mutual proximity finds a clip's action better.
+    their names. mutual: whether ranking by mutual proximity finds a clip's action better. landmarks: how far
+    clusters by landmarks are from those of all pairs.
     """
     from functools import partial
 

@@ -14,6 +14,7 @@ from motionary.workflows.commands.options import (
     QUARANTINED,
     AsJson,
     CatalogUrl,
+    Memory,
     Scheduler,
     Workers,
     fail,
@@ -33,7 +34,11 @@ EXAMPLES = {
         "motionary run LIBRARY CATALOG --dry-run  # what there is to do",
         "motionary run LIBRARY CATALOG --json | jq .clusters",
     ),
-    "demo": ("motionary demo", "motionary demo FOLDER --seed 1"),
+    "demo": (
+        "motionary demo",
+        "motionary demo FOLDER --seed 1",
+        "motionary demo FOLDER --clips 10000  # how this machine does on a large library",
+    ),
     "graph": ("motionary graph graph.svg", "motionary graph graph.txt --library LIBRARY"),
 }
 
@@ -92,6 +97,7 @@ def run(
     ] = True,
     config: Annotated[Path | None, typer.Option("--config", help="Settings of every stage, TOML.")] = None,
     workers: Workers = None,
+    memory: Memory = None,
     scheduler: Scheduler = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what there is to do, and write nothing.")
@@ -99,9 +105,47 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
-    from motionary.workflows.preparation import Job, prepare
-    from motionary.workflows.settings import PAPER, load_settings
+    from motionary.workflows.preparation import prepare
     from motionary.workflows.tables import write_json
+
+    job = job_of(
+        library=library, catalog=catalog, also=also, labels=labels, label_pattern=label_pattern,
+        label_column=label_column, paper=paper, primary=primary, metric=metric, clusters=clusters,
+        threshold=threshold, weights=weights, full_grid=full_grid, travel=travel, config=config,
+        workers=workers, memory=memory, scheduler=scheduler,
+    )  # fmt: skip
+    if not dry_run:
+        _run(job, as_json)
+    elif as_json:
+        write_json(vars(prepare(job).plan))
+    else:
+        print(prepare(job).plan)
+
+
+def job_of(
+    *,
+    library: Path,
+    catalog: str,
+    also: list[Path] | None,
+    labels: Path | None,
+    label_pattern: str | None,
+    label_column: str | None,
+    paper: bool,
+    primary: str | None,
+    metric: str | None,
+    clusters: int | None,
+    threshold: float | None,
+    weights: str | None,
+    full_grid: bool,
+    travel: bool,
+    config: Path | None,
+    workers: int | None,
+    memory: int | None,
+    scheduler: str | None,
+) -> Job:
+    """Make a job of the options of `run`."""
+    from motionary.workflows.preparation import Job
+    from motionary.workflows.settings import PAPER, load_settings
 
     if clusters is not None and threshold is not None:
         raise typer.BadParameter("give --clusters or --threshold, not both")
@@ -119,15 +163,8 @@ def run(
         {"search": "full"} if full_grid else {}
     )
     libraries = [str(one) for one in (library, *(also or []))]
-    job = Job(
-        libraries, catalog, load_settings(config, options), labels, _count(workers), scheduler, label_pattern
-    )
-    if not dry_run:
-        _run(job, as_json)
-    elif as_json:
-        write_json(vars(prepare(job).plan))
-    else:
-        print(prepare(job).plan)
+    settings = load_settings(config, options)
+    return Job(libraries, catalog, settings, labels, _count(workers), scheduler, label_pattern, memory)
 
 
 def demo(
@@ -135,21 +172,35 @@ def demo(
         "motionary-demo"
     ),
     seed: Annotated[int, typer.Option("--seed", help="Of the embedded library.")] = 0,
+    clips: Annotated[
+        int, typer.Option("--clips", min=1, help="In the library; made larger, it keeps those it has.")
+    ] = 80,
     workers: Workers = None,
+    memory: Memory = None,
     as_json: AsJson = False,
 ) -> None:
     """Run the main job on the embedded library of made-up motions and show the result."""
+    from functools import partial
+
     from motionary.pipeline.synthetic import write_library
+    from motionary.workflows.errors import UserError
     from motionary.workflows.preparation import Job
+    from motionary.workflows.progress import progress
     from motionary.workflows.settings import load_settings
 
     library, catalog = folder / "library", folder / "catalog"
     log = stderr_console()
     log.print(f"Writing the embedded library to {library}", highlight=False, soft_wrap=True)
-    write_library(library, seed=seed)
+    try:
+        with progress({"write": clips}, log) as done:
+            count, written = _count(workers), partial(done, "write")
+            write_library(library, seed, clips, processes=count, written=written)
+    except ValueError as error:
+        raise UserError(str(error)) from error
     log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
     labels = library / "labels.csv"
-    job = Job([str(library)], str(catalog), load_settings(None, {}), labels, workers=_count(workers))
+    settings = load_settings(None, {})
+    job = Job([str(library)], str(catalog), settings, labels, workers=_count(workers), memory=memory)
     _run(job, as_json)
     if as_json:
         return
@@ -193,6 +244,7 @@ def _run(job: Job, as_json: bool) -> None:
             partial(log.print, COMPILING, highlight=False),
             take_over=lambda dead: log.print(f"taking over from a run that died: {dead}", highlight=False),
             planned=lambda plan: log.print(str(plan), highlight=False, soft_wrap=True),
+            remark=partial(log.print, highlight=False, soft_wrap=True),
         )
     except KeyboardInterrupt:
         fail("interrupted; the published catalog is as it was, and the same command resumes")

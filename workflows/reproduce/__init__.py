@@ -17,6 +17,8 @@ from motionary.workflows.reproduce.fp_dtw import study_fp_dtw
 from motionary.workflows.reproduce.fp_dtw_report import fp_dtw_report
 from motionary.workflows.reproduce.gtw import study_gtw
 from motionary.workflows.reproduce.gtw_report import gtw_report
+from motionary.workflows.reproduce.landmarks import study_landmarks
+from motionary.workflows.reproduce.landmarks_report import landmarks_report
 from motionary.workflows.reproduce.mutual import mutual_report, study_mutual
 from motionary.workflows.reproduce.report import report
 from motionary.workflows.reproduce.style import TAKES, conduct_style, style_report
@@ -45,5 +47,6 @@ EXPERIMENTS = {
     "style": Experiment(conduct_style, lambda made: style_report(made.study), TAKES, "made up"),
     "assign": Experiment(study_assign, assign_report, 5),
     "mutual": Experiment(study_mutual, mutual_report, 1),
+    "landmarks": Experiment(study_landmarks, landmarks_report, 5),
 }
 """By name."""

@@ -33,6 +33,7 @@ from motionary.workflows.reproduce.adaptive_dtw_measures import (
     measure_known,
     measure_pair,
 )
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.cotw_measures import Measurement, Measurements, known_takes
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.labelled import LabelledClips, labelled_clips
@@ -40,14 +41,6 @@ from motionary.workflows.reproduce.pairs import MOST_ACTIONS, Pair, comparable_b
 
 Group = tuple[str, frozenset[str]]
 """An action, and the names of the joints of those of its clips that can be compared with each other."""
-
-
-@dataclass(frozen=True, eq=False)
-class AdaptiveExperiment:
-    """The measurements, and what they were made on."""
-
-    study: Measurements
-    notes: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +56,7 @@ class Library:
 
 def study_adaptive_dtw(
     catalog: Catalog | None, label_column: str, draws: int, seed: int, show: Show
-) -> AdaptiveExperiment:
+) -> Conducted[Measurements]:
     """Align pairs of takes, and sequences of takes, by DTW, constrained DTW and adaptive DTW.
 
     Parameters
@@ -112,7 +105,7 @@ def study_adaptive_dtw(
         for take in takes:
             rows += measure_known(take)
             advance("known warps")
-    return AdaptiveExperiment(Measurements(rows), _notes(library, rows, pairs, catalog, seed))
+    return Conducted(Measurements(rows), _notes(library, rows, pairs, catalog, seed))
 
 
 def comparable_pairs(library: Library, draws: int, seed: int) -> dict[str, list[Pair]]:

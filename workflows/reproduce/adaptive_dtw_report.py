@@ -9,7 +9,6 @@ from __future__ import annotations
 import pandas as pd
 from rich.console import Group, RenderableType
 
-from motionary.workflows.reproduce.adaptive_dtw import AdaptiveExperiment
 from motionary.workflows.reproduce.adaptive_dtw_measures import (
     ADAPTIVE,
     CONSTRAINED,
@@ -19,6 +18,8 @@ from motionary.workflows.reproduce.adaptive_dtw_measures import (
     SETTINGS,
     TAKES,
 )
+from motionary.workflows.reproduce.claims import Claim, claims_table
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.cotw_measures import KNOWN, Measurements
 from motionary.workflows.tables import text_table
 
@@ -40,7 +41,7 @@ _MEASURES = {"deviation": 2, "stay": 1, "jerk": 2, "distance": 3, "seconds": 4}
 _MISSING = "-"
 
 
-def adaptive_dtw_report(experiment: AdaptiveExperiment) -> RenderableType:
+def adaptive_dtw_report(experiment: Conducted[Measurements]) -> RenderableType:
     """Lay the experiment out for reading; all its numbers are `Measurements.to_arrow`."""
     study = experiment.study
     parts: list[RenderableType] = [*experiment.notes, _LEGEND]
@@ -50,12 +51,13 @@ def adaptive_dtw_report(experiment: AdaptiveExperiment) -> RenderableType:
             parts += ["", _methods_table(study, part, title)]
     parts += ["", _known_table(study), "", _settings_table(study)]
     if not study.of(SEQUENCES, "stay").empty:
-        parts += ["", *claims(study)]
+        title = "What the paper says, held against the sequences of takes joined"
+        parts += ["", claims_table(claims(study), title)]
     return Group(*parts)
 
 
-def claims(study: Measurements) -> list[str]:
-    """Say of each of the paper's claims whether it holds on the sequences here, with the numbers.
+def claims(study: Measurements) -> list[Claim]:
+    """Hold what the paper says against the sequences here.
 
     Means are compared over the sequences that both methods could align.
     """
@@ -69,18 +71,17 @@ def claims(study: Measurements) -> list[str]:
     ]
 
 
-def _claim(study: Measurements, measure: str, said: str, other: str) -> str:
+def _claim(study: Measurements, measure: str, said: str, other: str) -> Claim:
+    claim = f"{ADAPTIVE} {said}"
     measured = study.of(SEQUENCES, measure)
     both = measured.reindex(columns=[ADAPTIVE, other]).dropna()
     if both.empty:
-        return f"On no sequence can it be told whether adaptive DTW {said}: {other} aligns none."
+        return Claim(claim, None, f"{other} aligns none of the sequences")
     ours, others = both.mean()
     digits = _MEASURES[measure]
     which = f"{len(both)}" if len(both) == len(measured) else f"{len(both)} of {len(measured)}"
-    return (
-        f"On {which} sequences adaptive DTW {said}: {'holds' if ours < others else 'does not hold'}, "
-        f"{ours:.{digits}f} against {others:.{digits}f} on average."
-    )
+    here = f"{measure} {ours:.{digits}f} against {others:.{digits}f}, means over {which} sequences"
+    return Claim(claim, bool(ours < others), here)
 
 
 def _methods_table(study: Measurements, part: str, title: str) -> RenderableType:

@@ -32,6 +32,7 @@ from motionary.workflows.reproduce.assign_trial import (
     assign_held_out,
     read_known_clips,
 )
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.labelled import labelled_clips
 
@@ -76,14 +77,6 @@ class AssignStudy:
 
 
 @dataclass(frozen=True, eq=False)
-class AssignExperiment:
-    """A study, and what it was made on."""
-
-    study: AssignStudy
-    notes: list[str]
-
-
-@dataclass(frozen=True, eq=False)
 class _Set:
     """Some labelled clips: their names, classes, and subjects where all are known."""
 
@@ -93,7 +86,9 @@ class _Set:
     subjects: NDArray[np.object_] | None
 
 
-def study_assign(catalog: Catalog, label_column: str, draws: int, seed: int, show: Show) -> AssignExperiment:
+def study_assign(
+    catalog: Catalog, label_column: str, draws: int, seed: int, show: Show
+) -> Conducted[AssignStudy]:
     """Hold takes of a labelled catalog out, all of its clips and each dataset's alone.
 
     Parameters
@@ -127,7 +122,7 @@ def study_assign(catalog: Catalog, label_column: str, draws: int, seed: int, sho
         f"{draws} times parted into {FOLDS} folds, seed {seed}. In every fold the clusters are made, cut, "
         "named and given their references anew, without what it holds out."
     ]
-    return AssignExperiment(AssignStudy(pa.Table.from_pylist(rows, schema=_ROWS)), notes)
+    return Conducted(AssignStudy(pa.Table.from_pylist(rows, schema=_ROWS)), notes)
 
 
 def _sets(catalog: Catalog, label_column: str, seed: int) -> list[_Set]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from rich.console import Group, RenderableType
 
-from motionary.workflows.reproduce.assign import CLASSES, SUBJECTS, TAKES, AssignExperiment
+from motionary.workflows.reproduce.assign import CLASSES, SUBJECTS, TAKES, AssignStudy
 from motionary.workflows.reproduce.assign_trial import BOTH, FROM_CLIP, FROM_REFERENCE, NEAREST, RULES
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.tables import text_table
 
 REACHES = (FROM_REFERENCE, FROM_CLIP, BOTH)
 
 
-def assign_report(experiment: AssignExperiment) -> RenderableType:
+def assign_report(experiment: Conducted[AssignStudy]) -> RenderableType:
     """Lay a study out for reading; the rows are `AssignStudy.to_arrow`."""
     share = experiment.study.share
     sets = list(dict.fromkeys(experiment.study.to_arrow()["clips"].to_pylist()))

@@ -13,7 +13,6 @@ made by both kinds of DOFs, and with pairs of two people and of one: first as in
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -23,6 +22,7 @@ from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.motion import FloatArray
 from motionary.pipeline.stages.columns import matrix, per_clip
 from motionary.pipeline.synthetic import synthetic_library
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.cotw_measures import (
     METHODS,
     WITH_ANY_DISTORTION,
@@ -42,15 +42,9 @@ from motionary.workflows.reproduce.pairs import MOST_ACTIONS, Action, draw_actio
 POSITIONS, ANGLES = "joint positions", "root and joint angles"
 
 
-@dataclass(frozen=True, eq=False)
-class CotwExperiment:
-    """The measurements, and what they were made on."""
-
-    study: Measurements
-    notes: list[str]
-
-
-def study_cotw(catalog: Catalog, label_column: str, draws: int, seed: int, show: Show) -> CotwExperiment:
+def study_cotw(
+    catalog: Catalog, label_column: str, draws: int, seed: int, show: Show
+) -> Conducted[Measurements]:
     """Align pairs of labelled clips, and takes of the embedded library, by every method.
 
     Parameters
@@ -97,7 +91,7 @@ def study_cotw(catalog: Catalog, label_column: str, draws: int, seed: int, show:
                 action.name, action.members, [positions[one] for one in action.members]
             )
             advance("references")
-    return CotwExperiment(Measurements(rows), _notes(actions, positions, label_column, len(takes), seed))
+    return Conducted(Measurements(rows), _notes(actions, positions, label_column, len(takes), seed))
 
 
 def _read_positions(catalog: Catalog, clip_ids: Iterable[str]) -> dict[str, FloatArray]:

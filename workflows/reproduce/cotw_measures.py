@@ -30,6 +30,7 @@ from motionary.pipeline.alignment.dtw import derivative_dtw
 from motionary.pipeline.alignment.trajectories import computed_trajectories, roughness
 from motionary.pipeline.alignment.uniform import uniform_times
 from motionary.pipeline.alignment.warp import interpolate
+from motionary.pipeline.alignment.weights import varying_dofs
 from motionary.pipeline.config import FeatureConfig
 from motionary.pipeline.features import POSE_COLUMNS, frame_features, sample_times
 from motionary.pipeline.motion import FloatArray, Motion
@@ -234,11 +235,6 @@ def measure_references(action: str, ids: Sequence[str], clips: Sequence[FloatArr
         for measure, value in (("roughness", roughness(trajectory, weights)), ("correlation", correlation)):
             rows.append(Measurement(REFERENCES, action, None, name, kind, measure, value))
     return rows
-
-
-def varying_dofs(clips: Sequence[FloatArray]) -> FloatArray:
-    """Weigh DOFs (dofs,): 0 where no clip moves, as the pelvis does not over its origin, else 1."""
-    return np.any([np.ptp(clip, axis=0) > 0 for clip in clips], axis=0).astype(np.float64)
 
 
 def _pose(motion: Motion) -> FloatArray:

@@ -13,7 +13,7 @@ import pandas as pd
 from rich.console import Group, RenderableType
 from scipy.stats import ttest_ind_from_stats
 
-from motionary.workflows.reproduce.cotw import CotwExperiment
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.cotw_measures import (
     ANY_DISTORTION,
     FIXED,
@@ -54,7 +54,7 @@ _LEGEND = (
 )
 
 
-def cotw_report(experiment: CotwExperiment) -> RenderableType:
+def cotw_report(experiment: Conducted[Measurements]) -> RenderableType:
     """Lay the experiment out for reading; all its numbers are `Measurements.to_arrow`."""
     study = experiment.study
     tables = (

@@ -13,11 +13,10 @@ algorithms are tested at both rates, on the same pairs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from motionary.catalog import Catalog
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.dtw_curve import Show
 from motionary.workflows.reproduce.fp_dtw_clips import (
     Takes,
@@ -31,17 +30,9 @@ from motionary.workflows.reproduce.fp_dtw_measures import Alignment, FpStudy, me
 from motionary.workflows.reproduce.pairs import Pair
 
 
-@dataclass(frozen=True, eq=False)
-class FpExperiment:
-    """The alignments, and what they were made on."""
-
-    study: FpStudy
-    notes: list[str]
-
-
 def study_fp_dtw(
     catalog: Catalog | None, label_column: str, draws: int, seed: int, show: Show
-) -> FpExperiment:
+) -> Conducted[FpStudy]:
     """Align pairs of takes of one action online, by every method, window and constraint.
 
     Parameters
@@ -80,7 +71,7 @@ def study_fp_dtw(
                     both = clips[moving][rate], clips[reference][rate]
                     rows += measure_pair(rate, action, (moving, reference), *both)
                     advance("align")
-    return FpExperiment(FpStudy(rows), _notes(takes, drawn, clips, seed))
+    return Conducted(FpStudy(rows), _notes(takes, drawn, clips, seed))
 
 
 def _load_kernels(clip: TurningClip) -> None:

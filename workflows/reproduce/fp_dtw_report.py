@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from rich.console import Group, RenderableType
 
 from motionary.workflows.reproduce.claims import claims_table
-from motionary.workflows.reproduce.fp_dtw import FpExperiment
+from motionary.workflows.reproduce.conducted import Conducted
 from motionary.workflows.reproduce.fp_dtw_claims import IN_THE_PAPER, PASS_BOTH, claims, passing
 from motionary.workflows.reproduce.fp_dtw_measures import IMPERCEPTIBLE, UTW, WINDOWS, Algorithm, FpStudy
 from motionary.workflows.tables import text_table
@@ -40,7 +40,7 @@ _LEGEND = (
 )
 
 
-def fp_dtw_report(experiment: FpExperiment) -> RenderableType:
+def fp_dtw_report(experiment: Conducted[FpStudy]) -> RenderableType:
     """Lay the experiment out for reading; all its numbers are `FpStudy.to_arrow`."""
     study = experiment.study
     parts: list[RenderableType] = list(experiment.notes)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
+from motionary.catalog.own_pairs import all_pairs_are_there
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.assets import asset
 from motionary.catalog.views.cluster_map import cluster_map_figure
@@ -32,6 +33,7 @@ from motionary.catalog.views.sections import (
     quarantine_section,
     scores_section,
     threshold_section,
+    why_no_chart,
 )
 
 if TYPE_CHECKING:
@@ -73,7 +75,9 @@ def report_page(catalog: Catalog, since: Since | None = None) -> str:
     cards, queue = cluster_cards(catalog), review_queue(catalog)
     footage = footage_of(catalog, chain(takes_by_importance(cards), reviewed_clips(queue)))
     charts = {
-        "map": cluster_map_figure(catalog) if len(catalog.clips) > 1 else None,
+        "map": cluster_map_figure(catalog)
+        if len(catalog.clips) > 1 and all_pairs_are_there(catalog)
+        else None,
         "labels": confusion_figure(catalog),
         "dendrogram": dendrogram_figure(catalog),
         "thresholds": mu_kappa_figure(catalog),
@@ -83,10 +87,10 @@ def report_page(catalog: Catalog, since: Since | None = None) -> str:
         cards_section(cards, footage),
         review_section(queue, footage),
         quarantine_section(catalog, _MOST_QUARANTINED),
-        _map_section(charts["map"]),
+        _map_section(catalog, charts["map"]),
         _labels_section(charts["labels"]),
         dendrogram_section(catalog, charts["dendrogram"], packed_chart),
-        threshold_section(charts["thresholds"], packed_chart),
+        threshold_section(catalog, charts["thresholds"], packed_chart),
         scores_section(catalog),
         timings_section(catalog),
         settings_section(catalog),
@@ -116,10 +120,10 @@ def _contents(body: Sequence[str]) -> str:
     return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
 
 
-def _map_section(figure: go.Figure | None) -> str:
+def _map_section(catalog: Catalog, figure: go.Figure | None) -> str:
     title = "Map"
     if figure is None:
-        return section(title, "A map needs two clips.", name="map")
+        return section(title, why_no_chart(catalog, "A map"), name="map")
     return section(
         title,
         "Every clip is a point, and clips that move alike lie together. Press one to play it, where the page "

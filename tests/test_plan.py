@@ -1,0 +1,269 @@
+"""What a run will take: sizes, memory and its refusal, the model of time, and the command."""
+
+import json
+from collections import namedtuple
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motionary.pipeline.config import PipelineConfig
+from motionary.pipeline.layout import Clip, Layout
+from motionary.pipeline.readers.library import FileState, Source
+from motionary.pipeline.task import MAKES
+from motionary.workflows.costs.amounts import Amounts, clip_sizes
+from motionary.workflows.costs.calibration import Calibration, Share, Tile, calibrate
+from motionary.workflows.costs.made_up import Squares
+from motionary.workflows.costs.memory import need_of, refuse
+from motionary.workflows.costs.model import foretold_by, with_seconds
+from motionary.workflows.costs.sample import sample_size, sampled
+from motionary.workflows.costs.sizes import parse_size, size_text, time_text
+from motionary.workflows.errors import UserError
+from motionary.workflows.main_job import run
+from motionary.workflows.nightly_settings import load_nightly
+from motionary.workflows.preparation import Job, prepare
+from motionary.workflows.settings import SettingsError
+
+GIB = 1 << 30
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [("4GB", 4e9), ("512MiB", 512 << 20), ("1.5 g", 1.5e9), ("100", 100), ("2TiB", 2 << 40), (" 8kB ", 8e3)],
+)
+def test_sizes_are_read(text, size):
+    assert parse_size(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "GB", "0", "0GB", "-4GB", "4 apples", "nan", "inf", "1e9", "4GB4"])
+def test_what_is_no_size_is_refused_with_a_mend(text):
+    with pytest.raises(ValueError, match="4GB or 512MiB"):
+        parse_size(text)
+
+
+def test_sizes_and_times_are_written_shortly():
+    assert [size_text(size) for size in (0, 1, 2.14e9, 25e9, 3e6)] == [
+        "0 kB",
+        "1 kB",
+        "2.1 GB",
+        "25 GB",
+        "3.0 MB",
+    ]
+    assert [time_text(one) for one in (3, 150, 7300, 200 * 3600)] == ["3 s", "2 min", "2.0 h", "8.3 days"]
+
+
+def amounts(clips: int, a_clip: int = 80_000) -> Amounts:
+    side = min(clips, 1 << max(5, int(np.log2(3 * clips**0.5))))
+    return Amounts(
+        clips, batch=min(clips, 64) * a_clip, file=a_clip, tile=side * side, library=clips * a_clip
+    )
+
+
+@given(st.integers(1, 200_000), st.integers(1, 64), st.integers(1, 10))
+def test_more_clips_and_more_workers_need_no_less_memory(clips, workers, more):
+    need = need_of(amounts(clips), workers, 64 * GIB)
+    assert need_of(amounts(clips + more), workers, 64 * GIB).bytes >= need.bytes
+    assert need_of(amounts(clips), workers + more, 64 * GIB).bytes >= need.bytes
+    assert need.bytes >= need.base + max(need.stages.values())
+
+
+def test_a_worker_of_a_running_cluster_is_one_process():
+    need = need_of(amounts(1000), 8, None, "tcp://nowhere:1")
+    assert (need.processes, need.workers, need.allowed) == (1, 1, None)
+    assert need.bytes < need_of(amounts(1000), 8, None).bytes
+    refuse(need)
+
+
+def test_less_memory_leaves_tasks_less_room():
+    rooms = [need_of(amounts(10_000), 2, memory).room for memory in (GIB, 3 * GIB // 2, 8 * GIB, 64 * GIB)]
+    assert rooms == sorted(rooms)
+    assert 0 < rooms[0] < rooms[1] < rooms[2] == rooms[3]
+
+
+def test_a_refusal_tells_both_numbers_what_needs_it_and_a_mend_that_mends():
+    need = need_of(amounts(10_000), 8, 2 * 10**9)
+    with pytest.raises(UserError) as told:
+        refuse(need)
+    message = str(told.value)
+    assert size_text(need.bytes) in message
+    assert "2.0 GB is allowed" in message
+    assert need.largest in message
+    fewer = int(message.split("--workers ")[1].split(maxsplit=1)[0])
+    refuse(need_of(amounts(10_000), fewer, 2 * 10**9))
+    with pytest.raises(UserError):
+        refuse(need_of(amounts(10_000), fewer + 1, 2 * 10**9))
+    refuse(need_of(amounts(10_000), 8, parse_size(message.split("--memory ")[1])))
+
+
+def test_where_one_worker_is_too_much_none_fewer_is_proposed():
+    with pytest.raises(UserError, match=r"--memory [\d.]+GB$") as told:
+        refuse(need_of(amounts(100), 4, 10**8))
+    assert "--workers" not in str(told.value)
+
+
+def test_a_run_that_needs_too_much_writes_nothing(demo_library, tmp_path, silent_progress):
+    job = Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig(), memory=10**8)
+    with pytest.raises(UserError, match=r"needs about .* of memory and 100 MB is allowed"):
+        run(job, silent_progress)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("full", "told"), [("catalog", "out; make room"), ("temporary", "TMPDIR")])
+def test_a_run_for_which_a_disk_is_too_small_writes_nothing(
+    full, told, demo_library, tmp_path, monkeypatch, silent_progress
+):
+    usage = namedtuple("usage", "free")
+    monkeypatch.setattr(
+        "motionary.workflows.costs.disk.shutil.disk_usage",
+        lambda path: usage(1000 if (Path(path) == tmp_path) == (full == "catalog") else 10**12),
+    )
+    with pytest.raises(UserError, match="1 kB is free") as refused:
+        run(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig()), silent_progress)
+    assert told in str(refused.value)
+    assert not (tmp_path / "out").exists()
+
+
+def library(sizes) -> Layout:
+    names = [f"{number:05d}.bvh" for number in range(len(sizes))]
+    sources = [
+        Source(name, name, "", (name,), name, "bvh", (FileState(name, size, 0, 0, 0),))
+        for name, size in zip(names, sizes, strict=True)
+    ]
+    return Layout([[[Clip(source, source.clip_id) for source in sources]]])
+
+
+@given(st.lists(st.integers(1, 10**6), min_size=1, max_size=500))
+def test_a_sample_is_of_different_clips_of_all_sizes(sizes):
+    layout = library(sizes)
+    drawn = [clip for clip in sampled(layout, clip_sizes(layout))]
+    assert len({clip.clip_id for clip in drawn}) == len(drawn) == sample_size(len(sizes))
+    ranks = sorted(sorted(sizes).index(clip.source.states[0].size) for clip in drawn)
+    stretch = len(sizes) / len(drawn)
+    # Equal sizes share the lowest rank of them.
+    assert all(rank <= (place + 1) * stretch for place, rank in enumerate(ranks))
+
+
+def test_what_lies_in_a_zip_has_its_share_of_it(tmp_path):
+    archive = tmp_path / "all.zip"
+    archive.write_bytes(b"x" * 1000)
+    names = [f"{archive}/{number}.bvh" for number in range(4)]
+    states = [(FileState(name, 1000, 0, 0, 0),) for name in names]
+    sources = [Source(n, n, "", (n,), n, "bvh", state) for n, state in zip(names, states, strict=True)]
+    sizes = clip_sizes(Layout([[[Clip(source, source.clip_id) for source in sources]]]))
+    assert set(sizes.values()) == {1000}  # four times a zip's bytes, among four
+
+
+MEASURED = Calibration(
+    clips=35, quarantined=0, bytes=35 * 20_000, source_frames=3081, frames=2324, merged_frames=606, pairs=595,
+    stages={stage: Share(1.0, 10_000) for stage in MAKES},
+    tile=Tile(alone=5e-3, batch=2e-3, pair=2e-5, disk=3000, pair_disk=40),
+    squares=Squares(((400, 0.2), (1200, 1.0)), passing=1e-7, similarity=2e-8),
+    concentration=0.2, starting=5.0, seconds=10.0,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ready(demo_library):
+    return prepare(
+        Job([str(demo_library)], str(demo_library.parent / "nowhere"), PipelineConfig(), workers=2)
+    )
+
+
+def test_more_workers_take_no_longer_and_leave_what_does_not_divide(ready):
+    told = foretold_by(ready, MEASURED)
+    assert [one.workers for one in told.elapsed] == [1, 2, 8, 64]
+    divided = [one.seconds for one in told.elapsed[1:]]
+    assert divided == sorted(divided, reverse=True)
+    assert all(one.undivided <= one.seconds for one in told.elapsed)
+    assert told.seconds == told.elapsed[1].seconds
+
+
+def test_the_whole_library_is_counted(ready):
+    told = foretold_by(ready, MEASURED)
+    assert (told.clips, told.pairs) == (80, 3160)
+    by_stage = {one.stage: one for one in told.stages}
+    assert list(by_stage) == list(MAKES)
+    assert by_stage["compare"].tasks == len(ready.graph.compared)
+    assert by_stage["align"].seconds == pytest.approx(80 / 35)
+    assert told.disk == sum(one.disk for one in told.stages)
+
+
+def test_work_grows_with_what_was_measured(ready):
+    slow = replace(
+        MEASURED,
+        tile=replace(MEASURED.tile, pair=2e-3),
+        squares=Squares(((400, 2.0), (1200, 10.0)), 1e-6, 1e-6),
+    )
+    few, many = foretold_by(ready, MEASURED), foretold_by(ready, slow)
+    for stage, one, other in zip(MAKES, few.stages, many.stages, strict=True):
+        assert (other.seconds > one.seconds) == (stage in ("compare", "cluster", "represent"))
+
+
+def test_what_is_stored_costs_nothing(demo_library, demo_catalog):
+    labels = demo_library / "labels.csv"
+    there = prepare(Job([str(demo_library)], demo_catalog, PipelineConfig(), labels, workers=2))
+    told = foretold_by(there, MEASURED)
+    assert told.work == 0
+    assert told.disk == 0
+    assert told.plan.to_read == 0
+
+
+def test_the_calibration_runs_every_stage_and_leaves_nothing(ready, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    measured = calibrate(ready.graph)
+    assert measured.clips == sample_size(80)
+    assert measured.pairs == measured.clips * (measured.clips - 1) // 2
+    assert all(share.seconds > 0 and share.disk > 0 for share in measured.stages.values())
+    assert min(measured.tile.pair, measured.squares.passing, measured.squares.similarity) > 0
+    assert 0 < measured.concentration <= 1
+    assert not list(tmp_path.iterdir())
+    told = foretold_by(ready, measured)
+    frames = 5364  # of all 80 clips at the common rate
+    assert told.frames == pytest.approx(frames, rel=0.2)
+
+
+def test_the_command_says_it_all(demo_library, motionary, monkeypatch, tmp_path):
+    monkeypatch.setattr("motionary.workflows.costs.model.calibrate", lambda graph, compiling: MEASURED)
+    code, out, err = motionary("plan", demo_library, "--workers", 2, "--memory", "4GB")
+    assert code == 0
+    assert "trying 35 of 80 clips" in err
+    for word in ("80 clips", "3,160 pairs", "of 4.0 GB allowed", "compare", "undivided", "disk:"):
+        assert word in out
+    code, out, err = motionary("plan", demo_library, tmp_path / "out", "--workers", 3, "--json")
+    told = json.loads(out)
+    assert {"seconds", "work", "disk", "memory", "pairs", "stages", "elapsed", "plan"} <= set(told)
+    assert [one["workers"] for one in told["elapsed"]] == [1, 2, 3, 8, 64]
+    assert told["room_on_disk"] > 0
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_size_that_is_none_is_a_usage_error(demo_library, motionary):
+    code, _, err = motionary("run", demo_library, "nowhere", "--memory", "lots")
+    assert code == 2
+    assert "4GB" in err
+    assert not Path("nowhere").exists()
+
+
+def test_a_dry_run_tells_both_numbers(demo_library, motionary, tmp_path):
+    code, out, _ = motionary("run", demo_library, tmp_path / "out", "--dry-run", "--memory", "4GB")
+    assert code == 0
+    assert "of 4.0 GB allowed" in out
+
+
+def test_the_nightly_job_has_a_limit_of_memory(tmp_path):
+    text = '[job]\nlibraries = "takes"\ncatalog = "catalog"\nmemory = "{}"\n'
+    (tmp_path / "nightly.toml").write_text(text.format("4GB"))
+    assert load_nightly(tmp_path / "nightly.toml").job.memory == 4 * 10**9
+    (tmp_path / "wrong.toml").write_text(text.format("much"))
+    with pytest.raises(SettingsError, match=r"wrong.toml: .*job.memory.*512MiB"):
+        load_nightly(tmp_path / "wrong.toml")
+
+
+def test_only_large_first_runs_are_foretold_before_they_start(ready, monkeypatch):
+    monkeypatch.setattr("motionary.workflows.costs.model.calibrate", lambda graph, compiling: MEASURED)
+    assert with_seconds(ready, print, print) is ready
+    monkeypatch.setattr("motionary.workflows.costs.model._WORTH_IT", 80)
+    assert with_seconds(ready, print, print).plan.seconds == foretold_by(ready, MEASURED).seconds

@@ -1,0 +1,75 @@
+"""How much a library is, read off its layout without opening a file of it."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+from motionary.pipeline.layout import Layout
+from motionary.pipeline.readers.library import Source
+from motionary.pipeline.readers.zipped import archive_of
+
+_UNZIPPED = 4  # times a zip's bytes, of what lies in it: BVH and AMC are text
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """What the memory of a run depends on.
+
+    Parameters
+    ----------
+    clips : int
+    batch, file : int
+        Bytes of the files of the largest batch, and of the largest clip.
+    tile : int
+        Pairs of the largest tile.
+    library : int
+        Bytes of all files.
+    """
+
+    clips: int
+    batch: int
+    file: int
+    tile: int
+    library: int
+
+    @staticmethod
+    def of(layout: Layout) -> Amounts:
+        """Read them off a library's layout."""
+        sizes = clip_sizes(layout)
+        batches = [sum(sizes[clip.clip_id] for clip in batch) for batch in layout.batches]
+        sides = sorted(map(len, layout.sides), reverse=True)
+        return Amounts(
+            clips=len(sizes),
+            batch=max(batches, default=0),
+            file=max(sizes.values(), default=0),
+            tile=sides[0] * sides[min(1, len(sides) - 1)] if sides else 0,
+            library=sum(batches),
+        )
+
+
+def clip_sizes(layout: Layout) -> dict[str, int]:
+    """Say of every clip how many bytes it is read from; of what lies in a zip, its even share of that."""
+    inside = Counter(_archive(clip.source) for clip in layout)
+    return {clip.clip_id: _size(clip.source, inside) for clip in layout}
+
+
+def _size(source: Source, inside: Mapping[str | None, int]) -> int:
+    archive = _archive(source)
+    if archive is not None:
+        return _UNZIPPED * _on_disk(archive) // inside[archive]
+    return sum(state.size for state in source.states) or sum(map(_on_disk, source.files))
+
+
+def _on_disk(file: str) -> int:
+    with suppress(OSError, ValueError):  # gone meanwhile, or a name that is none
+        return os.stat(file).st_size  # noqa: PTH116 - of thousands of files
+    return 0
+
+
+def _archive(source: Source) -> str | None:
+    found = archive_of(source.files[0])
+    return None if found is None else str(found[0])
