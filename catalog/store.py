@@ -14,8 +14,8 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,7 +28,7 @@ import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 
 from motionary.catalog.errors import CatalogError
-from motionary.catalog.schema import conform
+from motionary.catalog.schema import SCHEMAS, conform
 from motionary.pipeline.layout import digest_of_settings
 
 Content: TypeAlias = "bytes | pa.Buffer"
@@ -170,8 +170,13 @@ class Store:
             return None
 
     def load(self, key: str, table: str, columns: Sequence[str] | None = None) -> pa.Table:
-        """Read one part, or some columns of it with their text as dictionaries, which take less memory."""
-        return self._read_part(self.part_name(table, key), self.filesystem, columns)
+        """Read one part, or some columns of it with their text as dictionaries, which take less memory.
+
+        On one thread: tasks share the cores among them, and a part is soon read.
+        """
+        texts = [one for one in columns or () if pa.types.is_string(SCHEMAS[table].field(one).type)]
+        with self._opened(self.part_name(table, key), self.filesystem, texts) as part:
+            return part.read(columns, use_threads=False)
 
     def read(self, files: Iterable[str]) -> pa.Table:
         """Read parts of one table, joined in the order given; a column one part lacks is null there.
@@ -188,11 +193,19 @@ class Store:
             [self._read_part(file, filesystem) for file in files], promote_options="default"
         )
 
-    def _read_part(self, file: str, filesystem: Any, columns: Sequence[str] | None = None) -> pa.Table:
+    def _read_part(self, file: str, filesystem: Any) -> pa.Table:
+        with self._opened(file, filesystem) as part:
+            return part.read()
+
+    @contextmanager
+    def _opened(
+        self, file: str, filesystem: Any, dictionaries: Sequence[str] = ()
+    ) -> Iterator[pq.ParquetFile]:
+        """Open a part; of one file this takes a third of what `pq.read_table` does, made for many."""
         try:
-            return pq.read_table(
-                self.path(file), filesystem=filesystem, columns=columns, read_dictionary=columns
-            )
+            path = self.path(file)
+            with pq.ParquetFile(path, filesystem=filesystem, read_dictionary=dictionaries) as part:
+                yield part
         except FileNotFoundError:
             raise
         except (pa.ArrowException, OSError) as error:

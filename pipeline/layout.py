@@ -173,12 +173,12 @@ class Layout:
 
 
 def side_for(clips: int, earlier: Earlier) -> int:
-    """Choose how many clips a side has: such that the tiles are some hundreds, or a tenth of the clips.
+    """Choose how many clips a side has: few enough that a tile fits into memory, else so many that it pays.
 
-    That is 32 up to 455 clips, 256 for 10,000 and 1,024 for 142,000. The earlier run's is kept while it is
-    not off by more than a factor of two.
+    That is 32 up to 113 clips, 512 for 10,000 and 1,024, the most, from 29,128. The earlier run's is kept
+    while it is not off by more than a factor of two.
     """
-    side = 1 << (max(32, isqrt(9 * clips)).bit_length() - 1)
+    side = 1 << (min(max(32, isqrt(36 * clips)), 1024).bit_length() - 1)
     return earlier.side if side <= 2 * earlier.side <= 4 * side else side
 
 

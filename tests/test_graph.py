@@ -80,18 +80,28 @@ def test_batches_hold_every_clip_once_in_order(size):
 
 
 @pytest.mark.parametrize(
-    ("clips", "side"), [(1, 32), (455, 32), (1000, 64), (3000, 128), (10_000, 256), (142_000, 1024)]
+    ("clips", "side"),
+    [
+        (1, 32),
+        (113, 32),
+        (1000, 128),
+        (3000, 256),
+        (10_000, 512),
+        (29_127, 512),
+        (29_128, 1024),
+        (10**6, 1024),
+    ],
 )
 def test_sides_grow_with_the_library_so_that_tiles_do_not_become_many(clips, side):
     assert side_for(clips, Earlier()) == side
-    assert (clips / side) * (clips / side + 1) / 2 < max(120, clips / 5)
+    assert (clips / side) * (clips / side + 1) / 2 < max(100, clips / 2)
 
 
 def test_a_side_stays_while_the_library_has_not_grown_much():
-    assert side_for(1000, Earlier(side=32)) == 32
-    assert side_for(3000, Earlier(side=32)) == 128
-    assert side_for(300, Earlier(side=64)) == 64
-    assert side_for(300, Earlier(side=256)) == 32
+    assert side_for(1000, Earlier(side=64)) == 64
+    assert side_for(3000, Earlier(side=64)) == 256
+    assert side_for(300, Earlier(side=128)) == 128
+    assert side_for(300, Earlier(side=512)) == 64
 
 
 def test_sides_are_read_in_batches_and_tiles_read_all_of_them():

@@ -101,10 +101,12 @@ def test_a_second_run_computes_nothing_and_changes_nothing(few, tmp_path, silent
     assert second.catalog.snapshot.snapshot_id == "000002"
 
 
-@pytest.mark.parametrize(("tile", "workers"), [(3, 2), (8, 1), (1, 1)])
-def test_tables_are_the_same_for_any_workers_and_tiles(few, tmp_path, silent_progress, tile, workers):
+@pytest.mark.parametrize(("tile", "workers", "memory"), [(3, 2, None), (8, 1, None), (1, 1, 500_000_000)])
+def test_tables_are_the_same_for_any_workers_tiles_and_memory(
+    few, tmp_path, silent_progress, tile, workers, memory
+):
     run(job(few, tmp_path / "one"), silent_progress)
-    run(job(few, tmp_path / "other", tile=tile, workers=workers), silent_progress)
+    run(job(few, tmp_path / "other", tile=tile, workers=workers, memory=memory), silent_progress)
     if tile == 3:
         assert table_bytes(tmp_path / "other") == table_bytes(tmp_path / "one")
     one, other = Catalog.open(tmp_path / "one"), Catalog.open(tmp_path / "other")

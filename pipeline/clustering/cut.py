@@ -95,7 +95,7 @@ def cut_tree(
         merges = int(np.searchsorted(heights, threshold, side="right"))
     else:
         merges = clips - _checked_kappa(n_clusters, clips)
-    return _clusters_after(Z, merges)
+    return clusters_after(Z[:merges], clips)
 
 
 def threshold_strips(Z: NDArray[np.float64]) -> pa.Table:
@@ -198,14 +198,17 @@ def _checked_kappa(n_clusters: int | None, clips: int) -> int:
     return int(n_clusters)
 
 
-def _clusters_after(Z: NDArray[np.float64], merges: int) -> NDArray[np.int64]:
-    clips = len(Z) + 1
-    top = np.arange(clips + merges)
-    for row in range(merges - 1, -1, -1):
-        top[Z[row, :2].astype(np.int64)] = top[clips + row]
-    _, lowest, cluster, size = np.unique(
-        top[:clips], return_index=True, return_inverse=True, return_counts=True
-    )
+def clusters_after(merges: NDArray[np.float64], clips: int) -> NDArray[np.int64]:
+    """Return the clusters (N,), `numbered`, that the first rows (M, 4) of a linkage matrix leave."""
+    top = np.arange(clips + len(merges))
+    for row in range(len(merges) - 1, -1, -1):
+        top[merges[row, :2].astype(np.int64)] = top[clips + row]
+    return numbered(top[:clips])
+
+
+def numbered(groups: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give groups (N,) the numbers 0, 1, .. by decreasing size, then by lowest member."""
+    _, lowest, group, size = np.unique(groups, return_index=True, return_inverse=True, return_counts=True)
     rank = np.empty(len(size), np.int64)
     rank[np.lexsort((lowest, -size))] = np.arange(len(size))
-    return rank[cluster]
+    return rank[group]

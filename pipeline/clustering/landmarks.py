@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionary.pipeline.clustering.choice import Cut
-from motionary.pipeline.clustering.cut import cut_tree
+from motionary.pipeline.clustering.cut import cut_tree, numbered
 from motionary.pipeline.clustering.landmark_steps import (
     REPRESENTATIVES,
     Groups,
@@ -48,7 +48,6 @@ from motionary.pipeline.clustering.primary import (
     condensed_channels,
     linkage_of,
     merge_key,
-    numbered,
     threshold_on_all,
     threshold_on_part,
 )

@@ -157,15 +157,14 @@ def _link(
         values[:, place] = channel
     merged, heights = nearest_neighbour_chain(values, np.array(rules), np.array(weights), clips)
     order = np.argsort(heights, kind="stable")
-    return _relabelled(merged[order], heights[order])
+    return relabelled(merged[order], heights[order], clips)
 
 
-def _relabelled(merged: NDArray[np.int64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn merges named by a clip of either side, sorted by height, into SciPy's numbered nodes."""
-    clips = len(merged) + 1
-    above = np.arange(2 * clips - 1)
-    size = np.ones(2 * clips - 1)
-    linkage = np.empty((clips - 1, 4))
+def relabelled(merged: NDArray[np.int64], heights: NDArray[np.float64], clips: int) -> NDArray[np.float64]:
+    """Turn merges (M, 2), each named by a clip of either side, sorted by height, into SciPy's nodes."""
+    above = np.arange(clips + len(merged))
+    size = np.ones(clips + len(merged))
+    linkage = np.empty((len(merged), 4))
     for row, pair in enumerate(merged):
         nodes = sorted(_top(above, clip) for clip in pair)
         above[nodes] = clips + row

@@ -59,11 +59,3 @@ def threshold_on_part(config: ClusterConfig, threshold: float, share: float) -> 
 def threshold_on_all(config: ClusterConfig, threshold: float, share: float) -> float:
     """Turn a threshold on a share of the clips into that on all: undoes `threshold_on_part`."""
     return threshold / sqrt(share) if config.primary == "ward" else threshold
-
-
-def numbered(groups: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give groups (m,) the numbers 0, 1, .. by decreasing size, then by lowest member, as `cut_tree` does."""
-    _, lowest, group, size = np.unique(groups, return_index=True, return_inverse=True, return_counts=True)
-    rank = np.empty(len(size), np.int64)
-    rank[np.lexsort((lowest, -size))] = np.arange(len(size))
-    return rank[group]

@@ -24,6 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
+from motionary.pipeline.clustering.cut import clusters_after
+from motionary.pipeline.clustering.linkage import relabelled
+
 
 @dataclass(frozen=True, eq=False)
 class SparseLinkage:
@@ -72,7 +75,8 @@ def complete_linkage_under(
     starts, counts = rows.indptr[:-1], np.diff(rows.indptr)
     merged, heights = sparse_chain(starts, counts, rows.indices, rows.data)
     order = np.argsort(heights, kind="stable")
-    return _numbered(clips, merged[order], heights[order].astype(np.float64))
+    merges = relabelled(merged[order], heights[order].astype(np.float64), clips)
+    return SparseLinkage(merges, clusters_after(merges, clips))
 
 
 def _rows(clips: int, first: ArrayLike, second: ArrayLike, distances: ArrayLike) -> csr_array:
@@ -104,27 +108,3 @@ def _rows(clips: int, first: ArrayLike, second: ArrayLike, distances: ArrayLike)
         raise ValueError(f"{repeated} of {len(values)} pairs are given again; give each once")
     rows.sort_indices()
     return rows
-
-
-def _numbered(clips: int, merged: NDArray[np.int64], heights: NDArray[np.float64]) -> SparseLinkage:
-    """Turn merges named by a clip of either side, sorted by height, into SciPy's nodes and into clusters."""
-    above = np.arange(clips + len(merged))
-    size = np.ones(clips + len(merged))
-    merges = np.empty((len(merged), 4))
-    for row, pair in enumerate(merged):
-        nodes = sorted(_top(above, clip) for clip in pair)
-        above[nodes] = clips + row
-        size[clips + row] = size[nodes].sum()
-        merges[row] = *nodes, heights[row], size[clips + row]
-    tops = np.array([_top(above, clip) for clip in range(clips)], dtype=np.int64)
-    _, lowest, cluster, count = np.unique(tops, return_index=True, return_inverse=True, return_counts=True)
-    rank = np.empty(len(count), np.int64)
-    rank[np.lexsort((lowest, -count))] = np.arange(len(count))
-    return SparseLinkage(merges, rank[cluster])
-
-
-def _top(above: NDArray[np.int64], node: int) -> int:
-    while above[node] != node:
-        above[node] = above[above[node]]
-        node = above[node]
-    return int(node)

@@ -30,6 +30,8 @@ def matrix(column: pa.ChunkedArray) -> NDArray:
         The rows have different lengths.
     """
     array = column.combine_chunks()
+    if not len(array):
+        return np.empty((0, 0))
     return array.flatten().to_numpy(zero_copy_only=False).reshape(len(array), -1)
 
 

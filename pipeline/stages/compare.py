@@ -63,9 +63,8 @@ def compare(
         i, j = np.indices((len(one.clip_ids), len(other.clip_ids))).reshape(2, -1)
     near = values["weighted"][one.place[i], other.place[j]] <= wanted.most
     i, j = i[near], j[near]
-    a, b = (pa.array(side.clip_ids, pa.string()).take(pa.array(k)) for side, k in ((one, i), (other, j)))
-    in_order = pc.less(a, b)
-    columns = {"clip_a": pc.if_else(in_order, a, b), "clip_b": pc.if_else(in_order, b, a)}
+    columns: dict[str, pa.Array] = {}
+    columns["clip_a"], columns["clip_b"] = _in_order(one.clip_ids, other.clip_ids, i, j)
     for name in _distances():
         found = values[name][one.place[i], other.place[j]]
         columns[name] = (
@@ -98,17 +97,30 @@ class _Side:
 
 def _distinct(resampled: pa.Table) -> _Side:
     place_of: dict[bytes, int] = {}
-    batch = per_clip(resampled)
+    features = matrix(resampled["feature"])
+    begin, clip_ids = 0, []
     names: list[str] = []
     clips: list[NDArray] = []
     place: list[int] = []
-    for clip_id, rows in batch.items():
-        frames = matrix(rows["feature"])
+    for clip_id, rows in per_clip(resampled).items():
+        frames = features[begin : (begin := begin + len(rows))]
+        clip_ids.append(clip_id)
         place.append(place_of.setdefault(frames.tobytes(), len(names)))
         if place[-1] == len(names):
             names.append(clip_id)
             clips.append(frames)
-    return _Side([*batch], names, clips, np.array(place, dtype=np.intp))
+    return _Side(clip_ids, names, clips, np.array(place, dtype=np.intp))
+
+
+def _in_order(
+    ids: Sequence[str], other_ids: Sequence[str], i: NDArray[np.intp], j: NDArray[np.intp]
+) -> tuple[pa.Array, pa.Array]:
+    """Name the clips of pairs, given by their places on either side, the earlier clip_id first."""
+    names = sorted({*ids, *other_ids})
+    rank = {name: place for place, name in enumerate(names)}
+    a, b = (np.array([rank[one] for one in side], dtype=np.intp)[k] for side, k in ((ids, i), (other_ids, j)))
+    called = pa.array(names, pa.string())
+    return called.take(pa.array(np.minimum(a, b))), called.take(pa.array(np.maximum(a, b)))
 
 
 def _distances() -> list[str]:
@@ -165,6 +177,9 @@ def _compute_between(
     wanted: _Wanted,
 ) -> None:
     """Compute the unknown pairs of two sides: together those columns that lack the same rows."""
+    if not known.any():
+        _compare(values, np.arange(len(known)), np.arange(known.shape[1]), clips, others, wanted)
+        return
     lacking, group_of = np.unique(~known, axis=1, return_inverse=True)
     for group, lacks in enumerate(lacking.T):
         columns = np.flatnonzero(group_of.reshape(-1) == group)

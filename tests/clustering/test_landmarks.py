@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
 from motionary.pipeline.clustering import choose_cut, complete_linkage, cut_tree, ward_linkage
+from motionary.pipeline.clustering.cut import numbered
 from motionary.pipeline.clustering.landmark_steps import (
     landmark_count,
     nearest_group,
@@ -16,7 +17,7 @@ from motionary.pipeline.clustering.landmark_steps import (
     standing_for,
 )
 from motionary.pipeline.clustering.landmarks import cluster_by_landmarks, refine
-from motionary.pipeline.clustering.primary import linkage_of, merge_key, numbered, threshold_on_part
+from motionary.pipeline.clustering.primary import linkage_of, merge_key, threshold_on_part
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.evaluation import adjusted_rand_index
 

@@ -32,6 +32,8 @@ EXAMPLES = {
         "motionary run LIBRARY CATALOG --labels labels.csv",
         "motionary run LIBRARY CATALOG --label-pattern '(?P<action>[a-z]+)_'",
         "motionary run LIBRARY CATALOG --dry-run  # what there is to do",
+        "motionary run LIBRARY CATALOG --primary complete --mu 0.2 --prune  # leaves most pairs out",
+        "motionary run LIBRARY CATALOG --landmarks auto  # of a library too large for all pairs",
         "motionary run LIBRARY CATALOG --json | jq .clusters",
     ),
     "demo": (
@@ -80,6 +82,23 @@ def run(
     threshold: Annotated[
         float | None, typer.Option("--threshold", "--mu", min=0, help="Cut the dendrogram at this height.")
     ] = None,
+    prune: Annotated[
+        bool,
+        typer.Option(
+            "--prune",
+            help="With --primary complete --mu: leave out pairs that a bound puts above mu. The same "
+            "clusters, sooner; the other partitions are then absent.",
+        ),
+    ] = False,
+    landmarks: Annotated[
+        str | None,
+        typer.Option(
+            "--landmarks",
+            metavar="N|auto",
+            help="For a library too large for all pairs: compare those of N clips (auto: 20 times the root "
+            "of all, 1,000 at least), and the others with clips like them. Nearly the same clusters.",
+        ),
+    ] = None,
     weights: Annotated[
         Literal["full", "legs", "arms"] | None,
         typer.Option("--weights", help="Part of the body that alignment attends to.", show_default="full"),
@@ -111,8 +130,8 @@ def run(
     job = job_of(
         library=library, catalog=catalog, also=also, labels=labels, label_pattern=label_pattern,
         label_column=label_column, paper=paper, primary=primary, metric=metric, clusters=clusters,
-        threshold=threshold, weights=weights, full_grid=full_grid, travel=travel, config=config,
-        workers=workers, memory=memory, scheduler=scheduler,
+        threshold=threshold, prune=prune, landmarks=landmarks, weights=weights, full_grid=full_grid,
+        travel=travel, config=config, workers=workers, memory=memory, scheduler=scheduler,
     )  # fmt: skip
     if not dry_run:
         _run(job, as_json)
@@ -135,6 +154,8 @@ def job_of(
     metric: str | None,
     clusters: int | None,
     threshold: float | None,
+    prune: bool,
+    landmarks: str | None,
     weights: str | None,
     full_grid: bool,
     travel: bool,
@@ -159,6 +180,13 @@ def job_of(
     options["clusters"] |= {name: value for name, value in given.items() if value is not None}
     if not travel:
         options["features"]["travel_time"] = 0.0
+    if prune and landmarks is not None:
+        raise typer.BadParameter("give --prune or --landmarks, not both")
+    if prune:
+        options["distances"] = {"pairs": "pruned"}
+    if landmarks is not None:
+        options["distances"] = {"pairs": "landmarks"}
+        options["clusters"]["landmarks"] = _landmarks(landmarks)
     options["alignment"] = ({"weights": weights} if weights else {}) | (
         {"search": "full"} if full_grid else {}
     )
@@ -255,6 +283,14 @@ def _run(job: Job, as_json: bool) -> None:
         print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
         raise typer.Exit(QUARANTINED)
+
+
+def _landmarks(given: str) -> int | None:
+    if given == "auto":
+        return None
+    if not given.isdecimal() or not int(given):
+        raise typer.BadParameter(f"--landmarks is {given!r}; give a number from 1, or auto")
+    return int(given)
 
 
 def _count(workers: int | None) -> int:

@@ -1,0 +1,115 @@
+"""A run that leaves far pairs out publishes the clusters of one that does not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from motionary.catalog import Catalog, CatalogError
+from motionary.catalog.verify import verify
+from motionary.catalog.views.overview import overview_page
+from motionary.catalog.views.report.page import report_page
+from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
+
+MU = 0.25
+
+
+def config_of(pairs: str, mu: float = MU, tile: int = 8) -> PipelineConfig:
+    clusters = ClusterConfig(primary="complete", threshold=mu)
+    return PipelineConfig(clusters=clusters, distances=DistanceConfig(pairs=pairs, tile=tile))
+
+
+@pytest.fixture(scope="module")
+def library(demo_library) -> list[str]:
+    return [str(demo_library / action) for action in ("walk", "run", "squat")]
+
+
+@pytest.fixture(scope="module")
+def pruned(library, tmp_path_factory, silent_progress) -> str:
+    url = str(tmp_path_factory.mktemp("pruned") / "catalog")
+    run(Job(library, url, config_of("pruned")), silent_progress)
+    return url
+
+
+@pytest.fixture(scope="module")
+def whole(library, tmp_path_factory, silent_progress) -> str:
+    url = str(tmp_path_factory.mktemp("whole") / "catalog")
+    run(Job(library, url, config_of("all")), silent_progress)
+    return url
+
+
+def rows(url: str, query: str) -> list:
+    with Catalog.open(url) as catalog:
+        return catalog.sql(query).to_pylist()
+
+
+def test_clusters_references_and_alignments_are_those_of_all_pairs(pruned, whole):
+    for table in ("clusters", '"references"', "alignments", "styles"):
+        query = f"select * from {table} order by clip_id"
+        assert rows(pruned, query) == rows(whole, query)
+    assert len(rows(pruned, 'select * from "references"')) > 3
+
+
+def test_the_pairs_are_those_of_at_most_mu_with_the_same_values(pruned, whole):
+    query = "select * from pairs where weighted <= 0.25 order by clip_a, clip_b"
+    assert rows(pruned, query) == rows(whole, query)
+    assert 0 < len(rows(pruned, "select clip_a from pairs")) == len(rows(pruned, query))
+    assert len(rows(pruned, query)) < len(rows(whole, "select clip_a from pairs"))
+
+
+def test_other_partitions_are_absent_and_the_pages_say_so(pruned):
+    assert rows(pruned, "select distinct method, metric from partitions") == [
+        {"method": "complete", "metric": "weighted"}
+    ]
+    assert rows(pruned, "select * from linkage") == []
+    with Catalog.open(pruned) as catalog:
+        for page in (overview_page(catalog), report_page(catalog)):
+            assert "are not known" in page
+            assert "needs two clips" not in page
+
+
+def test_it_verifies_and_answers(pruned, whole):
+    assert [check for check in verify(pruned) if not check.passed] == []
+    with Catalog.open(pruned) as some, Catalog.open(whole) as every:
+        clip_id = some.clips.to_arrow()["clip_id"][5].as_py()
+        found, wanted = some.similar(clip_id, 4), every.similar(clip_id, 4)
+        assert not found.from_pairs
+        assert found.table["clip_id"] == wanted.table["clip_id"]
+        with pytest.raises(CatalogError, match="mutual proximity needs all pairs"):
+            some.similar(clip_id, rank="mutual")
+
+
+def test_a_clip_more_compares_it_alone_and_ends_like_a_fresh_run(library, tmp_path, silent_progress):
+    first = Job(library[:2], str(tmp_path / "grown"), config_of("pruned"))
+    run(first, silent_progress)
+    grown = run(replace(first, libraries=library), silent_progress)
+    assert grown.plan.to_compare < grown.plan.to_read * 30
+    fresh = run(replace(first, libraries=library, catalog=str(tmp_path / "fresh")), silent_progress)
+    query = "from pairs order by clip_a, clip_b"
+    assert grown.catalog.sql(query) == fresh.catalog.sql(query)
+    assert len({Path(one).name for one in library}) == 3
+
+
+@pytest.mark.parametrize("tile", [3, 30])
+def test_tiles_change_nothing(library, pruned, tile, tmp_path, silent_progress):
+    result = run(Job(library, str(tmp_path / "out"), config_of("pruned", tile=tile)), silent_progress)
+    for query in ("from pairs order by clip_a, clip_b", "from clusters order by clip_id"):
+        assert result.catalog.sql(query).to_pylist() == rows(pruned, query)
+
+
+@pytest.mark.parametrize(
+    "clusters",
+    [ClusterConfig(), ClusterConfig(threshold=0.2), ClusterConfig(primary="complete")],
+)
+def test_pruning_needs_complete_linkage_cut_at_a_threshold(clusters):
+    with pytest.raises(ValueError, match="set the three, or compare all pairs"):
+        PipelineConfig(clusters=clusters, distances=DistanceConfig(pairs="pruned"))
+
+
+def test_the_command_line_says_what_pruning_needs(motionary, demo_library, tmp_path):
+    code, _, said = motionary("run", demo_library, tmp_path / "out", "--prune")
+    assert code == 1
+    assert "complete linkage on the weighted distance is cut at a threshold" in said
+    assert not (tmp_path / "out").exists()
