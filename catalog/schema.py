@@ -55,7 +55,10 @@ SCHEMAS: dict[str, pa.Schema] = {
     ),
 }
 
-_INTERNAL = ("ingested", "groups", "members", "represented", "centres", "reference_features")
+_INTERNAL = (
+    "ingested", "groups", "members", "represented", "centres", "reference_features",
+    "sampled", "standing", "assigned", "refined", "regrouped",
+)  # fmt: skip
 
 PUBLISHED = tuple(name for name in SCHEMAS if name not in _INTERNAL)
 """The tables that a catalog shows; the others pass from stage to stage."""

@@ -85,10 +85,18 @@ _RULES = (
     _Rule(
         "the run counted what is there", the_run_counted_them, ("clips", "quarantine", "references", "runs")
     ),
-    _Rule("every pair is there once", pairs_are_there_once, ("clips", "pairs", "runs")),
+    _Rule("every pair is there once", pairs_are_there_once, ("clips", "pairs", "runs", "regrouped")),
     _Rule("distances are distances", distances_are_sound, ("pairs",)),
-    _Rule("linkages are dendrograms", linkages_are_dendrograms, ("clips", "linkage", "cuts", "runs")),
-    _Rule("partitions hold every clip once", partitions_hold_every_clip, ("clips", "cuts", "partitions")),
+    _Rule(
+        "linkages are dendrograms",
+        linkages_are_dendrograms,
+        ("clips", "linkage", "cuts", "runs", "regrouped"),
+    ),
+    _Rule(
+        "partitions hold every clip once",
+        partitions_hold_every_clip,
+        ("clips", "cuts", "partitions", "runs", "regrouped"),
+    ),
     _Rule("clusters hold every clip once", clusters_hold_every_clip, ("clips", "clusters")),
     _Rule("clusters have one reference", clusters_have_a_reference, ("clips", "clusters", "references")),
     _Rule(

@@ -17,7 +17,7 @@ FeatureKind = Literal["pose+travel", "paper"]
 Metric = Literal["dtw", "b_dtw", "weighted", "fuzzy"]
 Effort = Literal["fast", "full"]
 Spacing = Literal["equal", "boundaries"]
-ComparedPairs = Literal["all", "pruned"]
+ComparedPairs = Literal["all", "pruned", "landmarks"]
 LinkageMethod = Literal["complete", "ward", "average", "fuzzy"]
 
 
@@ -96,9 +96,11 @@ class DistanceConfig:
     tile : int, optional
         Clips a side of a tile of pairs, about; by default as many as the library's size makes fit, see
         `motionary.pipeline.layout.side_for`. The results do not depend on it.
-    pairs : {"all", "pruned"}
+    pairs : {"all", "pruned", "landmarks"}
         Every pair is compared; or those alone whose weighted distance may be at most mu, which give the same
-        clusters as all where complete linkage is cut there, see `motionary.pipeline.distances.pruned`.
+        clusters as all where complete linkage is cut there, see `motionary.pipeline.distances.pruned`; or
+        those of some clips and of clusters, which give nearly the same, see
+        `motionary.pipeline.clustering.landmarks`.
     """
 
     thresholds: Literal["midpoints", "random"] = "midpoints"
@@ -107,7 +109,7 @@ class DistanceConfig:
     pairs: ComparedPairs = "all"
 
     def __post_init__(self) -> None:
-        _one_of("pairs", self.pairs, ("all", "pruned"))
+        _one_of("pairs", self.pairs, ("all", "pruned", "landmarks"))
         _one_of("thresholds", self.thresholds, ("midpoints", "random"))
         _at_least("seed", self.seed, 0)
         if self.tile is not None:
@@ -138,6 +140,9 @@ class ClusterConfig:
     reach : float
         How many times the furthest labelled member's distance to the reference an unlabelled clip may lie
         from it and still be named; 1.5 by our trial.
+    landmarks : int, optional
+        n, where not all pairs are compared but those of landmarks: clips of which every pair is; by default
+        20 sqrt(N), a thousand at least.
     """
 
     primary: LinkageMethod = "ward"
@@ -148,6 +153,7 @@ class ClusterConfig:
     n_clusters: int | None = None
     label_column: str = "action"
     reach: float = 1.5
+    landmarks: int | None = None
 
     def __post_init__(self) -> None:
         _one_of("primary", self.primary, ("ward", "complete", "average", "fuzzy"))
@@ -164,6 +170,8 @@ class ClusterConfig:
         if self.threshold is not None:
             _at_least("threshold", self.threshold, 0)
         _at_least("reach", self.reach, 0)
+        if self.landmarks is not None:
+            _at_least("landmarks", self.landmarks, 1)
 
 
 @dataclass(frozen=True)
@@ -252,6 +260,11 @@ class PipelineConfig:
                 "pairs are pruned where complete linkage on the weighted distance is cut at a threshold, and "
                 f"here primary is {clusters.primary!r}, metric {clusters.metric!r} and threshold "
                 f"{clusters.threshold}; set the three, or compare all pairs"
+            )
+        if clusters.landmarks is not None and self.distances.pairs != "landmarks":
+            raise ValueError(
+                f"there are {clusters.landmarks} landmarks, and pairs is {self.distances.pairs!r}; set it to "
+                "'landmarks', or leave them out"
             )
 
     @property

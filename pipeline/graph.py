@@ -16,18 +16,18 @@ caller gives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 from dask.task_spec import List, TaskRef
 from dask.task_spec import Task as DaskTask
 
 from motionary.pipeline.config import PipelineConfig
-from motionary.pipeline.layout import Earlier, Layout, digest_of_settings
+from motionary.pipeline.layout import Clip, Earlier, Layout, digest_of_settings
 from motionary.pipeline.origins import Block, clip_origins, pair_origins
 from motionary.pipeline.reuse import kept_alignments, kept_clusters
 from motionary.pipeline.stage_settings import stage_settings
@@ -43,7 +43,10 @@ from motionary.pipeline.stages import (
     resample,
     style,
 )
-from motionary.pipeline.task import MAKES, IsStored, TableStore, Task, TaskReport, run_task
+from motionary.pipeline.task import MAKES, OF_LANDMARKS, IsStored, TableStore, Task, TaskReport, run_task
+
+Load = Callable[..., pa.Table]
+"""Given a result's key, a table and maybe columns, what `TableStore.load` returns."""
 
 ROOM = 1 << 30
 """Bytes that a task may hold, unless the caller says otherwise."""
@@ -75,6 +78,14 @@ def dask_graph(
         )
         for task in tasks
     }  # fmt: skip
+
+
+class Grouped(NamedTuple):
+    """Who made the groups that are published: a stage, its table, and the key of its result."""
+
+    stage: str
+    table: str
+    key: str
 
 
 @dataclass(frozen=True)
@@ -181,25 +192,50 @@ class LibraryGraph:
             arguments=(self.labels, self.overrides, self.config.clusters),
         )  # fmt: skip
 
+    @property
+    def grouped(self) -> Grouped:
+        """What the published groups are read from."""
+        return Grouped("cluster", "groups", self.clustered.key)
+
     @cached_property
     def identified(self) -> Task:
         """The clusters numbered. Where they are those of the earlier run, so are the numbers."""
-        same = self._earlier("cluster") == self.clustered.key
+        stage, table, key = self.grouped
+        same = self._earlier(stage) == key
         before = self._earlier("identify")
         return Task(
-            "identify", before if same and before else self._key("identify", (self.clustered.key, before)),
+            "identify", before if same and before else self._key("identify", (key, before)),
             identify.identify,
-            reads=[("groups", [self.clustered.key]), *((table, _list(before)) for table in identify.MAKES)],
+            reads=[(table, [key]), *((one, _list(before)) for one in identify.MAKES)],
             arguments=(self.names, self.earlier.snapshot_id),
         )  # fmt: skip
+
+    @property
+    def compared_sides(self) -> Sequence[Sequence[Clip]]:
+        """The sides of the tiles of `compared`."""
+        return self.layout.sides
+
+    def later_pairs(self) -> int:
+        """Say how many pairs are compared, about, that no task of `compared` has."""
+        return 0
 
     def comparison(self) -> list[Task]:
         """List the tasks that lead to the clusters, each after those it reads from."""
         return [*self.ingested, *self.resampled, *self.compared, self.clustered, self.identified]
 
+    def waves(self, load: Load) -> Iterator[list[Task]]:
+        """List the tasks that lead to the clusters, those together that are known at a time.
+
+        Parameters
+        ----------
+        load : callable
+            Returns a table that a task of an earlier wave made, given its key.
+        """
+        yield self.comparison()
+
     def tasks_by_stage(self) -> dict[str, int]:
         """Count the tasks of every stage."""
-        counts = dict.fromkeys(MAKES, 1)
+        counts = {stage: 1 for stage in MAKES if stage not in OF_LANDMARKS}
         counts["ingest"] = counts["resample"] = counts["align"] = len(self.ingested)
         counts["compare"] = len(self.compared)
         return counts

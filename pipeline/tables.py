@@ -1,7 +1,7 @@
 """The tables that the stages make: columns, types and units.
 
-`ingested`, `groups`, `members`, `represented`, `centres` and `reference_features` pass from stage to stage;
-the others are a catalog's.
+`ingested`, `groups`, `members`, `represented`, `centres` and `reference_features` pass from stage to stage,
+and by landmarks `sampled`, `standing`, `assigned`, `refined` and `regrouped`; the others are a catalog's.
 
 A column's unit and meaning stand in its field metadata (`unit`, `meaning`), so that they travel with the
 table wherever it is kept.
@@ -27,6 +27,8 @@ def table_field(
 
 _CLIP = table_field("clip_id", pa.string(), "path of the clip in the library, with /")
 _CLUSTER = table_field("cluster_id", pa.int32(), "number that the cluster keeps from run to run")
+_GROUP = table_field("group", pa.int32(), "from 0, by falling size")
+_COMPARED = table_field("compared", pa.int64(), "pairs that were compared for it, each counted once")
 _FLOATS = pa.list_(pa.float32())
 
 _SKELETON = pa.struct(
@@ -50,6 +52,14 @@ _INGESTED = [
     table_field("unit", pa.float64(), "metres in one source unit, if known", "m", nullable=True),
     table_field("skeleton", _SKELETON, "joint names, parents, offsets (J x 3)", "source units"),
     table_field("notes", pa.list_(pa.string()), "what the reader changed or assumed"),
+]
+
+_RESAMPLED = [
+    _CLIP,
+    table_field("frame", pa.int32(), "merged frame, from 0"),
+    table_field("first_frame", pa.int32(), "first frame it stands for, at the common rate"),
+    table_field("last_frame", pa.int32(), "last frame it stands for, at the common rate"),
+    table_field("feature", _FLOATS, "the vector that distances compare"),
 ]
 
 _POSE = [
@@ -95,15 +105,8 @@ TABLES: dict[str, pa.Schema] = {
             table_field("feature", _FLOATS, "pose (57) and travel (2), before merging"),
         ]
     ),
-    "resampled": pa.schema(
-        [
-            _CLIP,
-            table_field("frame", pa.int32(), "merged frame, from 0"),
-            table_field("first_frame", pa.int32(), "first frame it stands for, at the common rate"),
-            table_field("last_frame", pa.int32(), "last frame it stands for, at the common rate"),
-            table_field("feature", _FLOATS, "the vector that distances compare"),
-        ]
-    ),
+    "resampled": pa.schema(_RESAMPLED),
+    "sampled": pa.schema(_RESAMPLED),
     "pairs": pa.schema(
         [
             table_field("clip_a", pa.string(), "the earlier clip_id of the pair"),
@@ -159,7 +162,24 @@ TABLES: dict[str, pa.Schema] = {
             table_field("ari_true", pa.float64(), "cut at that many clusters", nullable=True),
         ]
     ),
-    "groups": pa.schema([_CLIP, table_field("group", pa.int32(), "from 0, by falling size")]),
+    "groups": pa.schema([_CLIP, _GROUP]),
+    "standing": pa.schema(
+        [
+            _GROUP,
+            table_field("clip_id", pa.string(), "a landmark that stands for the group"),
+            table_field("feature", _FLOATS, "its merged frames, one after the other"),
+        ]
+    ),
+    "assigned": pa.schema([_CLIP, _GROUP, _COMPARED]),
+    "refined": pa.schema([_CLIP, table_field("first", pa.string(), "first clip of its part"), _COMPARED]),
+    "regrouped": pa.schema(
+        [
+            _CLIP,
+            _GROUP,
+            table_field("landmark", pa.bool_(), "whether it is compared with every other landmark"),
+            _COMPARED,
+        ]
+    ),
     "members": pa.schema([_CLIP, _CLUSTER]),
     "lineage": pa.schema(
         [

@@ -14,23 +14,32 @@ from threadpoolctl import threadpool_limits
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages import (
     align,
+    assign,
     cluster,
     compare,
     identify,
     ingest,
     name,
+    refine,
+    regroup,
     represent,
     resample,
+    sample,
+    stand,
     style,
 )
 from motionary.pipeline.tables import TABLES
 
 MAKES = {
-    "ingest": ingest.MAKES, "resample": resample.MAKES, "compare": compare.MAKES, "cluster": cluster.MAKES,
-    "identify": identify.MAKES, "represent": represent.MAKES, "align": align.MAKES, "style": style.MAKES,
-    "name": name.MAKES,
+    "ingest": ingest.MAKES, "resample": resample.MAKES, "sample": sample.MAKES, "compare": compare.MAKES,
+    "cluster": cluster.MAKES, "stand": stand.MAKES, "assign": assign.MAKES, "refine": refine.MAKES,
+    "regroup": regroup.MAKES, "identify": identify.MAKES, "represent": represent.MAKES, "align": align.MAKES,
+    "style": style.MAKES, "name": name.MAKES,
 }  # fmt: skip
 """The tables that each stage's results consist of; the stages in the order of the run."""
+
+OF_LANDMARKS = ("sample", "stand", "assign", "refine", "regroup")
+"""Stages that a run has where it clusters by landmarks; no other has them."""
 
 
 class TableStore(Protocol):

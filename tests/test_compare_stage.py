@@ -68,5 +68,7 @@ def test_what_was_known_changes_nothing(first, second, data):
             {name: names[name] for name in others},
         )
         carried.append((earlier, block))
-    wanted = whole["pairs"].filter(pc.less_equal(whole["pairs"]["weighted"], np.inf if most is None else most))
+    wanted = whole["pairs"].filter(
+        pc.less_equal(whole["pairs"]["weighted"], np.inf if most is None else most)
+    )
     assert rows(compare(batch(one), batch(other), CONFIG, most, carried)) == rows({"pairs": wanted})

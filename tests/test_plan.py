@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionary.pipeline.config import PipelineConfig
+from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
 from motionary.pipeline.layout import Clip, Layout
 from motionary.pipeline.readers.library import FileState, Source
-from motionary.pipeline.task import MAKES
+from motionary.pipeline.task import MAKES, OF_LANDMARKS
 from motionary.workflows.costs.amounts import Amounts, clip_sizes
 from motionary.workflows.costs.calibration import Calibration, Share, Tile, calibrate
 from motionary.workflows.costs.made_up import Squares
@@ -28,6 +28,7 @@ from motionary.workflows.preparation import Job, prepare
 from motionary.workflows.settings import SettingsError
 
 GIB = 1 << 30
+STAGES = [stage for stage in MAKES if stage not in OF_LANDMARKS]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_what_lies_in_a_zip_has_its_share_of_it(tmp_path):
 
 MEASURED = Calibration(
     clips=35, quarantined=0, bytes=35 * 20_000, source_frames=3081, frames=2324, merged_frames=606, pairs=595,
-    stages={stage: Share(1.0, 10_000) for stage in MAKES},
+    stages={stage: Share(1.0, 10_000) for stage in STAGES},
     tile=Tile(alone=5e-3, batch=2e-3, pair=2e-5, disk=3000, pair_disk=40),
     squares=Squares(((400, 0.2), (1200, 1.0)), passing=1e-7, similarity=2e-8),
     concentration=0.2, starting=5.0, seconds=10.0,
@@ -185,10 +186,20 @@ def test_the_whole_library_is_counted(ready):
     told = foretold_by(ready, MEASURED)
     assert (told.clips, told.pairs) == (80, 3160)
     by_stage = {one.stage: one for one in told.stages}
-    assert list(by_stage) == list(MAKES)
+    assert list(by_stage) == STAGES
     assert by_stage["compare"].tasks == len(ready.graph.compared)
     assert by_stage["align"].seconds == pytest.approx(80 / 35)
     assert told.disk == sum(one.disk for one in told.stages)
+
+
+def test_landmarks_are_foretold_to_take_less(demo_library, tmp_path):
+    config = PipelineConfig(clusters=ClusterConfig(landmarks=20), distances=DistanceConfig(pairs="landmarks"))
+    whole = Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig())
+    one, other = (foretold_by(prepare(job), MEASURED) for job in (whole, replace(whole, config=config)))
+    assert [stage.stage for stage in other.stages] == [*MAKES]
+    assert other.plan.to_compare == 20 * 19 // 2 + 80 * 20 // 2
+    assert other.seconds < one.seconds
+    assert other.disk < one.disk
 
 
 def test_work_grows_with_what_was_measured(ready):
@@ -198,7 +209,7 @@ def test_work_grows_with_what_was_measured(ready):
         squares=Squares(((400, 2.0), (1200, 10.0)), 1e-6, 1e-6),
     )
     few, many = foretold_by(ready, MEASURED), foretold_by(ready, slow)
-    for stage, one, other in zip(MAKES, few.stages, many.stages, strict=True):
+    for stage, one, other in zip(STAGES, few.stages, many.stages, strict=True):
         assert (other.seconds > one.seconds) == (stage in ("compare", "cluster", "represent"))
 
 

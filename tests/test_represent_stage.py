@@ -10,9 +10,10 @@ import pytest
 
 from motionary.catalog import Catalog
 from motionary.pipeline.alignment import joint_weights, score_references
-from motionary.pipeline.config import AlignmentConfig, ClusterConfig
+from motionary.pipeline.config import AlignmentConfig, ClusterConfig, DistanceConfig
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.represent import represent
+from motionary.pipeline.stages.represent_landmarks import represent_landmarks
 from motionary.pipeline.tables import TABLES
 
 LARGE = 2**40
@@ -38,6 +39,7 @@ def library(demo_catalog):
         "ingested": own("clips", "clip_id").select(["clip_id", "digest"]),
         "pairs": own("pairs", "clip_a", "clip_b"),
         "features": own("features", "clip_id"),
+        "resampled": own("resampled", "clip_id"),
     }
 
 
@@ -170,15 +172,19 @@ def test_a_clip_without_frames_is_named(library):
         made(library, features=Parts.of(features))
 
 
-def test_where_a_clip_stands_still_the_medoid_is_chosen(library):
-    still = clips_of(library)[5][0]
+def stilled(library, clip_id):
+    """The features, with a clip that does not move."""
     features = library["features"]
     vectors = np.array(features["feature"].to_pylist(), np.float32)
-    own = np.array(features["clip_id"].to_pylist()) == still
+    own = np.array(features["clip_id"].to_pylist()) == clip_id
     vectors[own] = vectors[own][0]
     field = TABLES["features"].field("feature")
     place = features.column_names.index("feature")
-    features = features.set_column(place, field, pa.array([*vectors], field.type))
+    return features.set_column(place, field, pa.array([*vectors], field.type))
+
+
+def test_where_a_clip_stands_still_the_medoid_is_chosen(library):
+    features = stilled(library, clips_of(library)[5][0])
     tables = made(library, features=Parts.of(features))
     ids = clips_of(library)[5]
     sums = dict.fromkeys(ids, 0.0)
@@ -192,6 +198,19 @@ def test_where_a_clip_stands_still_the_medoid_is_chosen(library):
     assert centres[2]["similarity_index"] is not None
     again = made(library, shuffled(library["pairs"], np.random.default_rng(4)), Parts.of(features), room=0)
     assert again == tables
+
+
+@pytest.mark.parametrize("metric", ["weighted", "dtw"])
+def test_distances_that_are_computed_there_choose_the_same(library, metric):
+    features = stilled(library, clips_of(library)[5][0])  # whose cluster gets a medoid
+    wanted = made(library, features=Parts.of(features), metric=metric)
+    empty = [TABLES[name].empty_table() for name in ("centres", "reference_features")]
+    resampled = divided(library["resampled"], np.random.default_rng(0))
+    found = represent_landmarks(
+        library["members"], library["ingested"], *empty, resampled, Parts.of(features), {},
+        DistanceConfig(), ClusterConfig(metric=metric), AlignmentConfig(), 0,
+    )  # fmt: skip
+    assert {name: table.combine_chunks() for name, table in found.items()} == wanted
 
 
 def test_a_kept_cluster_keeps_its_reference(library):

@@ -106,6 +106,8 @@ def run(
     with the_only_writer(ready.store, take_over):
         if current_snapshot(ready.store) != ready.before:  # somebody published while this run was preparing
             ready = prepare(job)
+        if ready.job.config.distances.pairs != job.config.distances.pairs:
+            remark(f"compares all pairs: landmarks are for more than {len(ready.graph.layout.keys)} clips")
         ready = with_seconds(ready, compiling, remark)
         planned(ready.plan)
         with (
@@ -126,7 +128,12 @@ def _refuse_too_much(ready: Prepared) -> None:
     """Refuse what does not fit before anything is written; workers elsewhere have disks of their own."""
     refuse(ready.need)
     if ready.job.scheduler is None:
-        refuse_small_disks(ready.store, Amounts.of(ready.graph.layout), ready.plan, ready.need)
+        refuse_small_disks(
+            ready.store,
+            Amounts.of(ready.graph.layout, ready.job.config.clusters.landmarks),
+            ready.plan,
+            ready.need,
+        )
 
 
 def _claim(store: Store) -> None:
@@ -163,7 +170,7 @@ def _compute(ready: Prepared, computation: Computation) -> list[TaskReport]:
     graph, store = ready.graph, ready.store
     represented = ready.before.tables.get("represented") if ready.before else None
     earlier = store.read(represented) if represented else SCHEMAS["represented"].empty_table()
-    made = computation.run(graph.comparison())
+    made = [report for tasks in graph.waves(store.load) for report in computation.run(tasks)]
     representation = graph.representation(store.load(graph.identified.key, "members"), earlier)
     made += computation.run([representation])
     references = store.load(representation.key, "represented")

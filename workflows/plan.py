@@ -106,8 +106,8 @@ def _contents_to_read(graph: LibraryGraph) -> int:
 
 def _pairs_to_compare(graph: LibraryGraph) -> int:
     """Count the pairs that no stored result holds, were every clip to be read."""
-    tiles = combinations_with_replacement(graph.layout.sides, 2)
-    count = 0
+    tiles = combinations_with_replacement(graph.compared_sides, 2)
+    count = graph.later_pairs()
     for task, (first, second) in zip(graph.compared, tiles, strict=True):
         if not graph.is_stored(task.key, task.makes):
             pairs = len(first) * (len(first) - 1) // 2 if first is second else len(first) * len(second)

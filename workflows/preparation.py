@@ -22,8 +22,10 @@ from motionary.catalog.labels import following
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import CURRENT, Snapshot, current_snapshot
 from motionary.catalog.store import Store
+from motionary.pipeline.clustering.landmark_steps import landmark_count
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.graph import LibraryGraph
+from motionary.pipeline.landmark_graph import LandmarkGraph
 from motionary.pipeline.layout import lay_out, side_for
 from motionary.pipeline.readers.library import KnownDigest, KnownMembers, Source, scan_library
 from motionary.pipeline.stage_settings import reading_settings
@@ -111,19 +113,40 @@ def prepare(job: Job) -> Prepared:
 
     earlier = earlier_run(store, before, then)
     side = job.config.distances.tile or side_for(len(sources), earlier)
-    job = replace(job, config=replace(job.config, distances=replace(job.config.distances, tile=side)))
+    job = replace(job, config=_settled(job.config, side, len(sources)))
     layout = lay_out(sources, reading_settings(job.config), side, earlier)
     _refuse_without_numbers(store, before)
     said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
     inputs = inputs_table(layout)
     labels = following(said or SCHEMAS["labels"].empty_table(), inputs)
     overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
-    need = need_of(Amounts.of(layout), job.workers, job.memory, job.scheduler)
+    amounts = Amounts.of(layout, job.config.clusters.landmarks)
+    need = need_of(amounts, job.workers, job.memory, job.scheduler)
     stored = StoredParts(store, before)
-    graph = LibraryGraph(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
+    kind = LandmarkGraph if job.config.distances.pairs == "landmarks" else LibraryGraph
+    graph = kind(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
     plan = plan_run(graph, store, before, job.workers, need)
     stale = _stale_labels(job, supplied, graph.names, then)
     return Prepared(job, store, roots, supplied, stale, before, inputs, labels, graph, plan, need)
+
+
+def _settled(config: PipelineConfig, side: int, clips: int) -> PipelineConfig:
+    """Fill in what depends on the library: the side of a tile, and how many landmarks there are.
+
+    Where they are not fewer than the clips, all pairs are compared.
+    """
+    distances, clusters = replace(config.distances, tile=side), config.clusters
+    if distances.pairs == "landmarks":
+        count = clusters.landmarks or landmark_count(clips)
+        if count >= clips:
+            all_pairs = replace(distances, pairs="all")
+            return replace(config, distances=all_pairs, clusters=replace(clusters, landmarks=None))
+        if clusters.n_clusters is not None and clusters.n_clusters > count:
+            raise UserError(
+                f"{clusters.n_clusters} clusters are asked for of {count} landmarks; take more landmarks"
+            )
+        clusters = replace(clusters, landmarks=count)
+    return replace(config, distances=distances, clusters=clusters)
 
 
 def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:

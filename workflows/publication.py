@@ -42,11 +42,10 @@ def publish_run(
     """
     store, before = ready.store, ready.before
     snapshot_id = next_snapshot_id(store)
-    tables = {
-        table: [store.part_name(table, report.key) for report in made if table in MAKES[report.stage]]
-        for makes in MAKES.values()
-        for table in makes
-    }
+    tables: dict[str, list[str]] = {}
+    for report in made:
+        for table in MAKES[report.stage]:
+            tables.setdefault(table, []).append(store.part_name(table, report.key))
     parts = {
         store.part_name(table, report.key): facts for report in made for table, facts in report.stored.items()
     }
@@ -77,7 +76,7 @@ def publish_run(
 def _record(
     ready: Prepared, made: Sequence[TaskReport], tables: dict[str, list[str]], run_id: str, started: datetime
 ) -> pa.Table:
-    store, seconds = ready.store, dict.fromkeys(MAKES, 0.0)
+    store, seconds = ready.store, dict.fromkeys(ready.graph.tasks_by_stage(), 0.0)
     for report in made:
         seconds[report.stage] += report.seconds
     row = {

@@ -8,6 +8,7 @@ from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 
 from motionary.catalog import Catalog
+from motionary.catalog.landmarks import approximation
 from motionary.catalog.snapshot import OVERVIEW
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.linkages import linkages_by_distance
@@ -22,6 +23,9 @@ def print_summary(catalog: Catalog, console: Console) -> None:
     run = catalog.last_run
     clips, clusters = counted(run["clips"], "clip"), counted(run["clusters"], "cluster")
     console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
+    found = approximation(catalog)
+    if found is not None:
+        console.print(f"{found} How far they may be from exact: motionary reproduce landmarks")
     parts: list[RenderableType] = []
     if run["quarantined"]:
         parts += ["", quarantine_table(catalog)]

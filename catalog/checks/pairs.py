@@ -7,9 +7,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from motionary.catalog.checks.clips import clip_ids
 from motionary.catalog.checks.found import MOST_TOLD, Found, parts
-from motionary.catalog.own_pairs import all_pairs_are_there
+from motionary.catalog.landmarks import clustered_clips, route_of
 from motionary.catalog.query import Catalog
 from motionary.pipeline.clustering.condensed import places_of
 from motionary.pipeline.stages.columns import matrix
@@ -18,9 +17,11 @@ from motionary.pipeline.stages.columns import matrix
 def pairs_are_there_once(catalog: Catalog) -> Found:
     """Every two clips are compared in one row, the earlier clip_id first; some are not where the run says so.
 
+    Of a run by landmarks, every two of these.
+
     In memory are one file of pairs and a byte for every pair.
     """
-    ids = pa.array(sorted(set(clip_ids(catalog))), pa.string())
+    ids = pa.array(clustered_clips(catalog), pa.string())
     clips = len(ids)
     seen = np.zeros(clips * (clips - 1) // 2, np.uint8)
     wrong = []
@@ -38,7 +39,7 @@ def pairs_are_there_once(catalog: Catalog) -> Found:
         wrong += [_pair_of(rows, row) + f" are compared again in {file}" for row in again[:MOST_TOLD]]
         seen[place] = 1
     missing = len(seen) - np.count_nonzero(seen)
-    if missing and all_pairs_are_there(catalog):
+    if missing and route_of(catalog) != "pruned":
         wrong.append(f"{missing} of {len(seen)} pairs are missing, the first of {_nth(ids, np.argmin(seen))}")
     return Found(f"{np.count_nonzero(seen)} pairs of {clips} clips", wrong)
 

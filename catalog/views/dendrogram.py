@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import leaves_list
 
+from motionary.catalog.landmarks import approximation
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.chart_text import full_text, short_text
 from motionary.catalog.views.colours import AXIS, CHART, COLOURS, GREY, cluster_colour, cluster_symbol
@@ -72,6 +73,9 @@ def dendrogram_figure(catalog: Catalog) -> go.Figure | None:
     if kept is None or len(kept.Z) == 0:
         return None
     clusters = catalog.clusters.to_arrow().sort_by("clip_id").to_pylist()
+    found = approximation(catalog)
+    if found is not None:
+        clusters = [one for one in clusters if one["clip_id"] in set(found.landmarks)]
     names = {one["cluster_id"]: one["label"] for one in catalog.references.to_arrow().to_pylist()}
     tree = lay_out(kept.Z, np.array([one["cluster_id"] for one in clusters]))
 
@@ -81,7 +85,7 @@ def dendrogram_figure(catalog: Catalog) -> go.Figure | None:
     line = {"color": GREY, "dash": "dash", "width": 1.5}
     figure.add_shape(type="line", x0=threshold, x1=threshold, yref="paper", y0=0, y1=1, line=line)
     figure.add_annotation(
-        text=f"cut at μ = {threshold:.4g}: {len(names)} clusters",
+        text=f"cut at μ = {threshold:.4g}: {kept.cut['published_clusters']} clusters",
         x=threshold,
         xanchor="right" if threshold > 0.8 * _last_mu(tree) else "left",
         yref="paper",

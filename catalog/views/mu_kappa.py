@@ -73,7 +73,7 @@ def mu_kappa_figure(catalog: Catalog) -> go.Figure | None:
         line={"color": GREY, "width": 1},
         hoverinfo="skip",
     )
-    _arrange(figure, len(catalog.clips), len(curves))
+    _arrange(figure, len(curves[0].Z) + 1, len(curves))
     return figure
 
 

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from motionary.catalog.landmarks import approximation, route_of
 from motionary.catalog.own_pairs import all_pairs_are_there
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.colours import cluster_character, cluster_colour
@@ -46,10 +47,18 @@ def heading(catalog: Catalog) -> str:
     made = f"Snapshot {catalog.snapshot.snapshot_id} of {created:%Y-%m-%d %H:%M} UTC"
     name = escape(catalog_name(catalog.store.url))
     library = ", ".join(f"<code>{escape(one)}</code>" for one in run["library"])
+    found = approximation(catalog)
+    nearly = "" if found is None else f'\n<p class="after">{escape(str(found))} {_MEASURED}</p>'
     return (
         f'<h1><bdi>{name}</bdi></h1>\n<p class="quiet">{made}, by motionary '
-        f"{escape(run['version'])}, from {library}</p>\n{figures}"
+        f"{escape(run['version'])}, from {library}</p>\n{figures}{nearly}"
     )
+
+
+_MEASURED = (
+    "How far such clusters are from those of all pairs is measured by "
+    "<code>motionary reproduce landmarks</code>, on a library small enough to have both."
+)
 
 
 def clusters_section(*body: str, further: str = "") -> str:
@@ -139,12 +148,13 @@ def why_no_chart(catalog: Catalog, what: str) -> str:
     """Say why a chart of all clips' distances is missing."""
     if all_pairs_are_there(catalog):
         return f"{what} needs two clips."
-    return f"{what} needs all pairs: {SOME_PAIRS[catalog.config.distances.pairs]}"
+    return f"{what} needs all pairs: {SOME_PAIRS[route_of(catalog)]}"
 
 
 SOME_PAIRS = {
     "pruned": "this run compared those alone whose weighted distance may be at most the threshold. Its "
     "clusters are exactly those of complete linkage; those of other distances and linkages are not known.",
+    "landmarks": "this run compared those of its landmarks, and the other clips with clips like them.",
 }
 """What a run that did not compare all pairs leaves open."""
 

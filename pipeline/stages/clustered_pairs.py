@@ -6,8 +6,9 @@ held is a number or two a clip; what comes out depends neither on the order of t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -19,6 +20,29 @@ from motionary.pipeline.stages.columns import pair_places, places_by_clip
 _GRAIN = 2.0**-30  # of distances that are summed; sums up to 2^23 leg lengths are then exact in any order
 
 _Places = NDArray[np.int64]
+
+
+class Inside(Protocol):
+    """Distances inside clusters, however they are come by."""
+
+    @property
+    def clip_ids(self) -> pa.ChunkedArray:
+        """The N clips."""
+
+    @property
+    def clusters(self) -> NDArray[np.integer]:
+        """The cluster of each."""
+
+    def distances_to(self, reference: _Places, column: str) -> NDArray[np.float64]:
+        """Return the distance of every clip to the one at this place, which represents its cluster."""
+
+    def sums(self, column: str, clusters: Collection[int]) -> NDArray[np.float64]:
+        """Return how far every clip of some clusters is from the others of its cluster."""
+
+
+def rounded(distances: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Round distances such that their sum does not depend on the order."""
+    return np.rint(distances.astype(np.float64) / _GRAIN) * _GRAIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +96,20 @@ class ClusteredPairs:
             raise ValueError(self._what_is_wrong_with(int(wrong[0]), column))
         return distances
 
-    def sums(self, column: str) -> NDArray[np.float64]:
-        """Return for every clip the sum of its distances to the others of its cluster, to 1e-9 a pair."""
+    def sums(self, column: str, clusters: Collection[int]) -> NDArray[np.float64]:
+        """Return the sum of every clip's distances to the others of its cluster, to 1e-9 a pair.
+
+        Parameters
+        ----------
+        column : str
+            Which distance.
+        clusters : collection of int
+            The clusters whose clips are asked for; the sums of others mean nothing.
+        """
         sums = np.zeros(len(self.clusters))
         for a, b, values in self._read(column):
-            rounded = np.rint(values / _GRAIN) * _GRAIN
             for one in (a, b):
-                sums += np.bincount(one, weights=rounded, minlength=len(sums))
+                sums += np.bincount(one, weights=rounded(values), minlength=len(sums))
         return sums
 
     def _read(self, column: str) -> Iterator[tuple[_Places, _Places, NDArray[np.float64]]]:

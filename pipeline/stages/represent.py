@@ -29,7 +29,7 @@ from motionary.pipeline.config import AlignmentConfig, ClusterConfig
 from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.motion import FloatArray
 from motionary.pipeline.parts import Parts
-from motionary.pipeline.stages.clustered_pairs import ClusteredPairs
+from motionary.pipeline.stages.clustered_pairs import ClusteredPairs, Inside
 from motionary.pipeline.stages.columns import matrix, per_clip, places_by_clip
 from motionary.pipeline.tables import TABLES
 
@@ -116,19 +116,39 @@ def represent(
     ValueError
         A pair of two clips of one cluster is missing or stands twice, or a clip has no frames.
     """
+    inside = ClusteredPairs(pairs, members["clip_id"], members["cluster_id"].to_numpy())
+    return represent_by(
+        inside, digests_of(ingested), centres, reference_features, features, kept, config, alignment, room
+    )
+
+
+def represent_by(
+    inside: Inside,
+    digests: Mapping[str, str],
+    centres: pa.Table,
+    reference_features: pa.Table,
+    features: Parts,
+    kept: Mapping[int, str],
+    config: ClusterConfig,
+    alignment: AlignmentConfig,
+    room: int,
+) -> dict[str, pa.Table]:
+    """Choose references by the similarity index, given the clips with their clusters and distances.
+
+    The parameters are those of `represent`; `digests` are of the clips of `ingested`.
+    """
+    members = pa.table({"clip_id": inside.clip_ids, "cluster_id": pa.array(inside.clusters, pa.int32())})
     places = places_by_clip(members["clip_id"])
-    clustered = ClusteredPairs(pairs, members["clip_id"], members["cluster_id"].to_numpy())
-    digests = dict(zip(ingested["clip_id"].to_pylist(), ingested["digest"].to_pylist(), strict=True))
     clusters = _clusters(members, kept, digests, features)
     weights = joint_weights(alignment.weights)
     similarities: dict[int, FloatArray] = {}
     for group in _groups(clusters, room):
         similarities |= _similarities(group, features, weights)
-    chosen = _chosen(clusters, similarities, clustered, places)
+    chosen = _chosen(clusters, similarities, inside, places)
 
     reference_of = {**kept, **{one.cluster_id: one.clip_ids[chosen[one.cluster_id]] for one in clusters}}
-    reference = np.array([places[reference_of[one]] for one in clustered.clusters.tolist()], dtype=np.int64)
-    distances = clustered.distances_to(reference, config.metric)
+    reference = np.array([places[reference_of[one]] for one in inside.clusters.tolist()], dtype=np.int64)
+    distances = inside.distances_to(reference, config.metric)
 
     rows = {row["cluster_id"]: row for row in centres.to_pylist()}
     frames = {one: earlier["feature"] for one, earlier in _by_cluster(reference_features).items()}
@@ -152,6 +172,11 @@ def represent(
         "centres": pa.Table.from_pylist(centre_rows, schema=TABLES["centres"]),
         "reference_features": pa.concat_tables([TABLES["reference_features"].empty_table(), *representing]),
     }
+
+
+def digests_of(ingested: pa.Table) -> dict[str, str]:
+    """Return the digest of every clip's bytes."""
+    return dict(zip(ingested["clip_id"].to_pylist(), ingested["digest"].to_pylist(), strict=True))
 
 
 def _clusters(
@@ -203,7 +228,7 @@ def _similarities(group: Sequence[_Cluster], features: Parts, weights: FloatArra
 def _chosen(
     clusters: Sequence[_Cluster],
     similarities: Mapping[int, FloatArray],
-    clustered: ClusteredPairs,
+    inside: Inside,
     places: Mapping[str, int],
 ) -> dict[int, int]:
     """Choose of every cluster the most similar clip, or the medoid; by its place in the cluster."""
@@ -213,7 +238,7 @@ def _chosen(
         if np.isfinite(similarity).any()
     }
     if len(chosen) < len(clusters):
-        sums = clustered.sums("weighted")
+        sums = inside.sums("weighted", {one.cluster_id for one in clusters} - chosen.keys())
         for one in clusters:
             if one.cluster_id not in chosen:
                 chosen[one.cluster_id] = first_of_least(sums[[places[clip_id] for clip_id in one.clip_ids]])

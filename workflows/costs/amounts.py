@@ -28,6 +28,8 @@ class Amounts:
         Pairs of the largest tile.
     library : int
         Bytes of all files.
+    landmarks : int, optional
+        Clips all pairs of which are compared, where those of all are not.
     """
 
     clips: int
@@ -35,9 +37,10 @@ class Amounts:
     file: int
     tile: int
     library: int
+    landmarks: int | None = None
 
     @staticmethod
-    def of(layout: Layout) -> Amounts:
+    def of(layout: Layout, landmarks: int | None = None) -> Amounts:
         """Read them off a library's layout."""
         sizes = clip_sizes(layout)
         batches = [sum(sizes[clip.clip_id] for clip in batch) for batch in layout.batches]
@@ -48,7 +51,13 @@ class Amounts:
             file=max(sizes.values(), default=0),
             tile=sides[0] * sides[min(1, len(sides) - 1)] if sides else 0,
             library=sum(batches),
+            landmarks=landmarks,
         )
+
+    @property
+    def clustered(self) -> int:
+        """Clips of which there are dendrograms."""
+        return self.clips if self.landmarks is None else self.landmarks
 
 
 def clip_sizes(layout: Layout) -> dict[str, int]:

@@ -20,7 +20,7 @@ from motionary.pipeline.compilation import compile_kernels
 from motionary.pipeline.graph import LibraryGraph
 from motionary.pipeline.layout import Earlier, Layout
 from motionary.pipeline.tables import TABLES
-from motionary.pipeline.task import MAKES, Task, TaskReport, run_task
+from motionary.pipeline.task import Task, TaskReport, run_task
 from motionary.workflows.costs.amounts import clip_sizes
 from motionary.workflows.costs.made_up import Squares, time_squares
 from motionary.workflows.costs.sample import in_two_sides, sampled
@@ -192,10 +192,13 @@ class _SampleRun:
 
     def _graph_of(self, layout: Layout) -> LibraryGraph:
         # Few clips may be fewer than the clusters that are asked for.
-        clusters = replace(self._library.config.clusters, n_clusters=None)
-        config = replace(self._library.config, clusters=clusters)
-        alone = replace(self._library, earlier=Earlier(), is_stored=lambda key, tables: False)
-        return replace(alone, layout=layout, config=config)
+        library, config = self._library, self._library.config
+        clusters, distances = replace(config.clusters, n_clusters=None), config.distances
+        if distances.pairs == "landmarks":  # all pairs of the sample tell what one takes
+            clusters, distances = replace(clusters, landmarks=None), replace(distances, pairs="all")
+        config = replace(config, clusters=clusters, distances=distances)
+        tables = library.labels, library.overrides
+        return LibraryGraph(layout, *tables, config, Earlier(), lambda key, tables: False, library.room)
 
 
 def _measured(run: _SampleRun, reports: Sequence[TaskReport], start: float, starting: float) -> Calibration:
@@ -213,7 +216,7 @@ def _measured(run: _SampleRun, reports: Sequence[TaskReport], start: float, star
         frames=len(features),
         merged_frames=merged,
         pairs=len(pairs),
-        stages={stage: _share(stage, reports) for stage in MAKES},
+        stages={stage: _share(stage, reports) for stage in graph.tasks_by_stage()},
         tile=_tile(run, len(pairs), _share("compare", reports).disk),
         squares=time_squares(store, ingested, pairs, features, graph.config.clusters),
         concentration=float(((counts / len(members)) ** 2).sum()),

@@ -24,7 +24,7 @@ from motionary.workflows.errors import UserError
 # Of two workers with compiled kernels and their client: 339 MB resident alone, 216 MB with what they share
 # divided among them (smaps_rollup after importing pipeline.graph and comparing eight clips).
 _SHARED, _PROCESS = 140e6, 200e6
-_LISTED = 4e3  # a clip in the layout, the graph and the tables of the library
+_LISTED = 15e3  # a clip in the layout, the graph and the library's tables: 155 MB of 10,000 in the client
 
 # Growth of a process's greatest resident memory while `ingest` read the largest take of HDM05, then the 32
 # largest (76.6 MB of 4.1 MB of text, 129 MB of 24 MB), and 64 embedded clips (54 MB of 8 MB).
@@ -32,6 +32,7 @@ _READ, _PARSED = 3.0, 16.0  # a byte of a batch's files, as tables and Parquet; 
 _ANY = 30e6  # a task, whatever it does
 _COMPARED = 500.0  # a pair of a tile: 456 of 256 clips with 256
 _CLUSTERED = 8e3  # a clip that is clustered: seven dendrograms, their cuts, the graph of its nearest others
+_LINKED = 8.0  # of the square of the landmarks, and of a group that is refined: see stages.cluster
 _NAMED = 600.0  # a clip in a task over the whole library: what it is called, its digest, its distance
 _POSED = 0.3  # a byte of the library, as poses at 30 frames a second: 309 bytes a frame, see stages.represent
 _STYLED, _AVERAGED, _ANALYSED = 2.6e3, 13e3, 62e3  # a clip of some 31 joints: see stages.style
@@ -41,7 +42,7 @@ _SCRATCH = 16.0  # a pair, in temporary files while it is clustered: see cluster
 _SLACK = 64e6
 """Bytes left beside the room of a task: what a part takes while it is read."""
 
-ONE_TASK = ("cluster", "identify", "represent", "style", "name")
+ONE_TASK = ("cluster", "stand", "regroup", "identify", "represent", "style", "name")
 """Stages that are one task, over the whole library."""
 
 
@@ -110,7 +111,7 @@ def need_of(amounts: Amounts, workers: int, memory: int | None, scheduler: str |
     room = ROOM if allowed is None else round(min(max(allowed - base - _SLACK, _SLACK), ROOM))
     stages = {stage: round(size) for stage, size in _tasks(amounts, room).items()}
     most = max(_at_once(stage, at_once) * size for stage, size in stages.items())
-    scratch = round(_SCRATCH * amounts.clips * (amounts.clips - 1) / 2)
+    scratch = round(_SCRATCH * amounts.clustered * (amounts.clustered - 1) / 2)
     return Need(base + most, allowed, room, at_once, processes, base, stages, scratch)
 
 
@@ -146,11 +147,14 @@ def _tasks(amounts: Amounts, room: int) -> dict[str, float]:
         "ingest": read + _PARSED * amounts.file,
         "resample": read,
         "compare": _COMPARED * amounts.tile,
-        "cluster": _CLUSTERED * clips,
+        "cluster": _CLUSTERED * amounts.clustered + _NAMED * (clips - amounts.clustered),
         "represent": _NAMED * clips + min(poses, max(room, undivided[0])),
         "align": read + _NAMED * clips,
         "style": _STYLED * clips + max(min(averages, room), undivided[1]),
     }
+    if amounts.landmarks is not None:
+        square = _LINKED * amounts.landmarks**2
+        held |= {"assign": read, "stand": square, "refine": square}
     return {stage: _ANY + size for stage, size in held.items()}
 
 

@@ -137,6 +137,8 @@ class _Library:
         Those that cannot be read among them.
     readable, pairs : float
         Clips that can be read, as far as the sample tells, and pairs of them.
+    clustered : float
+        Those of them all pairs of which are kept: the landmarks, or all.
     by_bytes, by_clips : float
         Times the sample, counted by bytes of files and by clips.
     """
@@ -144,6 +146,7 @@ class _Library:
     clips: int
     readable: float
     pairs: float
+    clustered: float
     by_bytes: float
     by_clips: float
 
@@ -153,7 +156,10 @@ class _Library:
         readable = len(sizes) * (1 - measured.quarantined / measured.clips)
         by_clips = len(sizes) / measured.clips
         by_bytes = sum(sizes.values()) / measured.bytes if measured.bytes else by_clips
-        return _Library(len(sizes), readable, readable * (readable - 1) / 2, by_bytes, by_clips)
+        landmarks = ready.job.config.clusters.landmarks
+        clustered = readable if landmarks is None else min(readable, landmarks)
+        pairs = readable * (readable - 1) / 2
+        return _Library(len(sizes), readable, pairs, clustered, by_bytes, by_clips)
 
     @property
     def length(self) -> float:
@@ -183,17 +189,18 @@ def _stages(ready: Prepared, measured: Calibration, library: _Library) -> Iterab
     }
     part = {"ingest": to_read, "resample": to_read, "compare": to_compare, "align": touched, "style": touched}
     tasks = graph.tasks_by_stage() | {"compare": len(missing)}
-    for stage in MAKES:
+    for stage in tasks:
         scale = library.by_clips if stage != "compare" else 0.0
-        disk = shares[stage].disk * scale
+        disk = shares[stage].disk * scale if stage in shares else 0.0
         if stage in ("ingest", "resample"):
             disk *= library.length
         if stage == "compare":
-            disk = len(graph.compared) * measured.tile.disk + library.pairs * measured.tile.pair_disk
+            kept = library.clustered * (library.clustered - 1) / 2
+            disk = len(graph.compared) * measured.tile.disk + kept * measured.tile.pair_disk
         share = part.get(stage, float(clustered))
         count = tasks[stage] if stage == "compare" else math.ceil(tasks[stage] * share)
         memory = ready.need.stages.get(stage, 0)
-        yield StageCost(stage, count, seconds[stage], memory, round(disk * share))
+        yield StageCost(stage, count, seconds.get(stage, 0.0), memory, round(disk * share))
 
 
 def _compare_seconds(
@@ -207,7 +214,7 @@ def _compare_seconds(
 def _cluster_seconds(measured: Calibration, library: _Library) -> float:
     (few, short), (many, long) = measured.squares.clusterings
     square = max(long - short, 0.0) / (many**2 - few**2)
-    return max(short - square * few**2, 0.0) + square * library.readable**2
+    return max(short - square * few**2, 0.0) + square * library.clustered**2
 
 
 def _represent_seconds(measured: Calibration, library: _Library, touched: float) -> float:
