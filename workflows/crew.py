@@ -70,17 +70,18 @@ class Crew:
             yield result
 
     def _look(self) -> None:
-        before, self._size = self._size, self.client.scheduler_info(n_workers=0)["n_workers"]
+        scheduler = self.client.scheduler_info(n_workers=0)
+        before, self._size = self._size, scheduler["n_workers"]
         self._looked = now = time.monotonic()
         if self._size == 0 and before != 0:
             self._alone_since = now
             self._remark(
-                f"no workers at {self.client.scheduler.address}; waiting for some, "
+                f"no workers at {scheduler['address']}; waiting for some, "
                 f"{_PATIENCE / 60:.0f} minutes at most"
             )
         elif self._size == 0 and now - self._alone_since > _PATIENCE:
             raise SchedulerError(
-                f"{self.client.scheduler.address} has had no workers for {_PATIENCE / 60:.0f} minutes; start "
+                f"{scheduler['address']} has had no workers for {_PATIENCE / 60:.0f} minutes; start "
                 "some, and run again: what is done is stored"
             )
         elif before is not None and self._size != before:

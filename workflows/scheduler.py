@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from motionary.pipeline.compilation import KernelCacheError, compile_kernels
@@ -174,9 +174,9 @@ def _begin_here(workplace: Workplace | None) -> None:
 
 def _refuse_other_versions(client: Client) -> None:
     """Refuse a scheduler, and workers, that could not even be told what to do."""
-    found = client.get_versions(packages=["motionary"])
+    found: Any = client.get_versions(packages=["motionary"])
     mine = found["client"]["packages"]["motionary"]
-    others = {f"the scheduler {client.scheduler.address}": found["scheduler"]}
+    others = {f"the scheduler {client.scheduler_info(n_workers=0)['address']}": found["scheduler"]}
     others |= {f"worker {address}": one for address, one in found["workers"].items()}
     for name, one in others.items():
         version = one["packages"]["motionary"]

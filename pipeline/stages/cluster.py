@@ -231,10 +231,9 @@ def _cut_row(dendrogram: Dendrogram, classes: Classes) -> pa.Table:
             "strip_low": cut.widest.mu_low,
             "strip_high": cut.widest.mu_high,
         }
-    row |= scores(cut.labels, classes)
-    if "classes" in row:
-        at_true = cut_tree(dendrogram.linkage, n_clusters=row["classes"])
-        row |= {
+    if classes is not None and (found := scores(cut.labels, classes)):
+        at_true = cut_tree(dendrogram.linkage, n_clusters=found["classes"])
+        row |= found | {
             "reward_punish_true": reward_punish(at_true, classes),
             "ari_true": adjusted_rand_index(at_true, classes),
         }

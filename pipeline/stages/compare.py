@@ -155,7 +155,7 @@ def _carried(
     return values, known
 
 
-def _rows(pairs: pa.Table, firsts: Sequence[str], seconds: Sequence[str]) -> NDArray[np.int64]:
+def _rows(pairs: pa.Table, firsts: NDArray[np.object_], seconds: NDArray[np.object_]) -> NDArray[np.int64]:
     """Find the row of each pair of clips, whichever comes first in it; -1 where there is none."""
     sides = [*pairs["clip_a"].chunks, *pairs["clip_b"].chunks]
     names = pc.unique(pa.chunked_array(sides, pa.string()))
