@@ -103,8 +103,8 @@ def _groups(inputs: pa.Table, column: str) -> list[dict[str, str]]:
 
 
 def _side(store: Store, snapshot: Snapshot) -> int:
-    settings = store.read(snapshot.tables["runs"])["settings"][-1].as_py()
-    return int(json.loads(settings)["distances"]["tile"])
+    run = store.read(snapshot.tables["runs"]).to_pylist()[-1]
+    return int(run.get("side") or json.loads(run["settings"])["distances"]["tile"])
 
 
 def _keys(files: Sequence[str]) -> list[str]:

@@ -124,15 +124,19 @@ def diff(before: Catalog, after: Catalog) -> Difference:
     return Difference(**{name: _table(_SCHEMAS[name], sorted(rows[name])) for name in _SCHEMAS})
 
 
+_LEFT_OUT = ("settings", "stage_seconds", "side")
+
+
 def run_history(catalog: Catalog) -> pa.Table:
     """List the runs that led to a catalog, oldest first, each with its snapshot and whether that is kept.
 
     Returns
     -------
     pyarrow.Table
-        run_id, snapshot, kept, and the columns of `runs` but for the settings and the seconds by stage.
+        run_id, snapshot, kept, and the columns of `runs` but for settings, seconds by stage and tiles.
     """
-    table = catalog.runs.to_arrow().sort_by("started_at").drop_columns(["settings", "stage_seconds"])
+    runs = catalog.runs.to_arrow().sort_by("started_at")
+    table = runs.select([name for name in runs.column_names if name not in _LEFT_OUT])
     for name in ("started_at", "finished_at"):
         seconds = table[name].cast(pa.timestamp("s", tz="UTC"), safe=False)
         table = table.set_column(table.column_names.index(name), name, seconds)

@@ -51,6 +51,7 @@ SCHEMAS: dict[str, pa.Schema] = {
             table_field(
                 "stage_seconds", pa.map_(pa.string(), pa.float64()), "work, summed over workers", "s"
             ),
+            table_field("side", pa.int32(), "clips a side of a tile, about", nullable=True),
         ]
     ),
 }

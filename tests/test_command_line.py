@@ -165,9 +165,12 @@ def test_graph_as_text_and_picture(motionary, tmp_path, demo_library):
     lines = (tmp_path / "graph.txt").read_text().splitlines()
     assert lines[0] == "ingest 1"
     assert "compare 2 <- resample 1, resample 2" in lines
-    assert next(line for line in lines if line.startswith("represent 1 <- ")).endswith(
-        "compare 6, ingest 1, ingest 2, ingest 3"
-    )
+    waits = next(line for line in lines if line.startswith("represent 1 <- ")).split(" <- ")[1].split(", ")
+    assert {*waits} == {
+        "identify 1",
+        *(f"ingest {n}" for n in (1, 2, 3)),
+        *(f"compare {n}" for n in range(1, 7)),
+    }
     assert "name 1 <- cluster 1, represent 1" in lines
     motionary("graph", tmp_path / "graph.svg", "--library", demo_library)
     picture = (tmp_path / "graph.svg").read_text()

@@ -76,8 +76,8 @@ class Job:
 class Prepared:
     """A job with its library listed, and with what the catalog's published snapshot offers it.
 
-    `stale_labels` are names in the labels file of files that were renamed since the published run, with the
-    clip_ids that these have now.
+    `side` is what the sides of tiles were cut by. `stale_labels` are names in the labels file of files that
+    were renamed since the published run, with the clip_ids that these have now.
     """
 
     job: Job
@@ -88,6 +88,7 @@ class Prepared:
     before: Snapshot | None
     inputs: pa.Table
     labels: pa.Table
+    side: int
     graph: LibraryGraph
     plan: Plan
     need: Need
@@ -113,7 +114,7 @@ def prepare(job: Job) -> Prepared:
 
     earlier = earlier_run(store, before, then)
     side = job.config.distances.tile or side_for(len(sources), earlier)
-    job = replace(job, config=_settled(job.config, side, len(sources)))
+    job = replace(job, config=_settled(job.config, len(sources)))
     layout = lay_out(sources, reading_settings(job.config), side, earlier)
     _refuse_without_numbers(store, before)
     said = store.read(before.tables["labels"]) if before and "labels" in before.tables else None
@@ -127,26 +128,23 @@ def prepare(job: Job) -> Prepared:
     graph = kind(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
     plan = plan_run(graph, store, before, job.workers, need)
     stale = _stale_labels(job, supplied, graph.names, then)
-    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, graph, plan, need)
+    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, side, graph, plan, need)
 
 
-def _settled(config: PipelineConfig, side: int, clips: int) -> PipelineConfig:
-    """Fill in what depends on the library: the side of a tile, and how many landmarks there are.
-
-    Where they are not fewer than the clips, all pairs are compared.
-    """
-    distances, clusters = replace(config.distances, tile=side), config.clusters
-    if distances.pairs == "landmarks":
-        count = clusters.landmarks or landmark_count(clips)
-        if count >= clips:
-            all_pairs = replace(distances, pairs="all")
-            return replace(config, distances=all_pairs, clusters=replace(clusters, landmarks=None))
-        if clusters.n_clusters is not None and clusters.n_clusters > count:
-            raise UserError(
-                f"{clusters.n_clusters} clusters are asked for of {count} landmarks; take more landmarks"
-            )
-        clusters = replace(clusters, landmarks=count)
-    return replace(config, distances=distances, clusters=clusters)
+def _settled(config: PipelineConfig, clips: int) -> PipelineConfig:
+    """Fill in how many landmarks there are; where they are not fewer than the clips, compare all pairs."""
+    distances, clusters = config.distances, config.clusters
+    if distances.pairs != "landmarks":
+        return config
+    count = clusters.landmarks or landmark_count(clips)
+    if count >= clips:
+        all_pairs = replace(distances, pairs="all")
+        return replace(config, distances=all_pairs, clusters=replace(clusters, landmarks=None))
+    if clusters.n_clusters is not None and clusters.n_clusters > count:
+        raise UserError(
+            f"{clusters.n_clusters} clusters are asked for of {count} landmarks; take more landmarks"
+        )
+    return replace(config, clusters=replace(clusters, landmarks=count))
 
 
 def _refuse_without_numbers(store: Store, before: Snapshot | None) -> None:

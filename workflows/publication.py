@@ -92,5 +92,6 @@ def _record(
         "clips_read": ready.plan.to_read,
         "pairs_computed": ready.plan.to_compare,
         "stage_seconds": list(seconds.items()),
+        "side": ready.side,
     }
     return pa.Table.from_pylist([row], schema=SCHEMAS["runs"])
