@@ -15,7 +15,6 @@ from motionary.catalog.store import Store
 from motionary.catalog.writer_lock import Writer, the_only_writer
 from motionary.pipeline.task import TaskReport
 from motionary.workflows.computation import Computation, StoredParts
-from motionary.workflows.costs.amounts import Amounts
 from motionary.workflows.costs.disk import refuse_small_disks
 from motionary.workflows.costs.memory import refuse
 from motionary.workflows.costs.model import with_seconds
@@ -128,12 +127,7 @@ def _refuse_too_much(ready: Prepared) -> None:
     """Refuse what does not fit before anything is written; workers elsewhere have disks of their own."""
     refuse(ready.need)
     if ready.job.scheduler is None:
-        refuse_small_disks(
-            ready.store,
-            Amounts.of(ready.graph.layout, ready.job.config.clusters.landmarks),
-            ready.plan,
-            ready.need,
-        )
+        refuse_small_disks(ready.store, ready.amounts, ready.plan, ready.need)
 
 
 def _claim(store: Store) -> None:

@@ -91,6 +91,7 @@ class Prepared:
     side: int
     graph: LibraryGraph
     plan: Plan
+    amounts: Amounts
     need: Need
 
 
@@ -128,7 +129,9 @@ def prepare(job: Job) -> Prepared:
     graph = kind(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
     plan = plan_run(graph, store, before, job.workers, need)
     stale = _stale_labels(job, supplied, graph.names, then)
-    return Prepared(job, store, roots, supplied, stale, before, inputs, labels, side, graph, plan, need)
+    return Prepared(
+        job, store, roots, supplied, stale, before, inputs, labels, side, graph, plan, amounts, need
+    )
 
 
 def _settled(config: PipelineConfig, clips: int) -> PipelineConfig:

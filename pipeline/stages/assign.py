@@ -10,8 +10,8 @@ import pyarrow as pa
 from motionary.pipeline.clustering.landmark_steps import nearest_group
 from motionary.pipeline.clustering.primary import merge_key
 from motionary.pipeline.config import ClusterConfig, DistanceConfig
-from motionary.pipeline.stages.clip_frames import Measure, channels_of, frames_by_clip
-from motionary.pipeline.stages.columns import per_clip
+from motionary.pipeline.stages.clip_frames import Measure, channels_of
+from motionary.pipeline.stages.columns import matrices_by_clip, per_clip
 from motionary.pipeline.stages.compare import thresholds_of
 from motionary.pipeline.tables import TABLES
 
@@ -46,9 +46,9 @@ def assign(
     dict of str to pyarrow.Table
         `assigned`.
     """
-    batch, group_of = frames_by_clip(resampled), dict(own)
+    batch, group_of = matrices_by_clip(resampled), dict(own)
     others = [clip_id for clip_id in batch if clip_id not in own]
-    stand = frames_by_clip(standing)
+    stand = matrices_by_clip(standing)
     if others:
         measure = Measure(channels_of(config), thresholds_of(distances))
         found = measure.between([batch[one] for one in others], [*stand.values()])

@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from motionary.pipeline.clustering.landmark_steps import Places
 from motionary.pipeline.clustering.mapped import mapped_array
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.parts import Parts
-from motionary.pipeline.stages.columns import matrix, per_clip
+from motionary.pipeline.stages.columns import matrices_by_clip, per_clip
 
 _BLOCK = 128
 
@@ -118,17 +117,12 @@ def frames_of(resampled: Parts, clip_ids: Sequence[str]) -> dict[str, NDArray[np
     start = dict(zip(lengths, ends - [*lengths.values()], strict=True))
     held: NDArray[np.float32] | None = None
     for part in resampled.read(["clip_id", "feature"]):
-        for clip_id, frames in frames_by_clip(part).items():
+        for clip_id, frames in matrices_by_clip(part).items():
             if clip_id in lengths:
                 if held is None:
                     held = mapped_array((int(ends[-1]), frames.shape[1]), np.float32)
                 held[start[clip_id] : start[clip_id] + len(frames)] = frames
     return {} if held is None else _cut(held, start, lengths)
-
-
-def frames_by_clip(resampled: pa.Table) -> dict[str, NDArray[np.float32]]:
-    """Return the merged frames of every clip of a table, in its order."""
-    return {clip_id: matrix(rows["feature"]) for clip_id, rows in per_clip(resampled).items()}
 
 
 def _cut(

@@ -44,6 +44,19 @@ def per_clip(table: pa.Table, column: str = "clip_id") -> dict[str, pa.Table]:
     return {names[codes[start]]: table.slice(start, end - start) for start, end in pairwise(bounds)}
 
 
+def matrices_by_clip(table: pa.Table) -> dict[str, NDArray]:
+    """Return the features of every clip as an array (rows, d); the rows stand clip by clip."""
+    values, begin, found = matrix(table["feature"]), 0, {}
+    for clip_id, rows in per_clip(table).items():
+        found[clip_id] = values[begin : (begin := begin + len(rows))]
+    return found
+
+
+def copied(rows: pa.Table) -> pa.Table:
+    """Copy the rows of a clip out of a part: a slice, as `per_clip` gives it, would keep the whole part."""
+    return rows.take(np.arange(len(rows)))
+
+
 def renamed(table: pa.Table, clip_id: str, column: str = "clip_id") -> pa.Table:
     """Give every row of a table this clip."""
     place = table.schema.get_field_index(column)

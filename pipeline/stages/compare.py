@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from motionary.pipeline.config import DistanceConfig
 from motionary.pipeline.origins import Block
-from motionary.pipeline.stages.columns import matrix, per_clip
+from motionary.pipeline.stages.columns import matrices_by_clip
 from motionary.pipeline.tables import TABLES
 
 VERSION = 1
@@ -97,19 +97,16 @@ class _Side:
 
 def _distinct(resampled: pa.Table) -> _Side:
     place_of: dict[bytes, int] = {}
-    features = matrix(resampled["feature"])
-    begin, clip_ids = 0, []
+    batch = matrices_by_clip(resampled)
     names: list[str] = []
     clips: list[NDArray] = []
     place: list[int] = []
-    for clip_id, rows in per_clip(resampled).items():
-        frames = features[begin : (begin := begin + len(rows))]
-        clip_ids.append(clip_id)
+    for clip_id, frames in batch.items():
         place.append(place_of.setdefault(frames.tobytes(), len(names)))
         if place[-1] == len(names):
             names.append(clip_id)
             clips.append(frames)
-    return _Side(clip_ids, names, clips, np.array(place, dtype=np.intp))
+    return _Side([*batch], names, clips, np.array(place, dtype=np.intp))
 
 
 def _in_order(

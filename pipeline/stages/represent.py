@@ -16,7 +16,7 @@ the weighted distance is taken, and the pairs are read once more.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,8 @@ from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.motion import FloatArray
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.clustered_pairs import ClusteredPairs, Inside
-from motionary.pipeline.stages.columns import matrix, per_clip, places_by_clip
+from motionary.pipeline.stages.columns import copied, matrix, per_clip, places_by_clip
+from motionary.pipeline.stages.groups import groups_within
 from motionary.pipeline.tables import TABLES
 
 VERSION = 4
@@ -142,7 +143,7 @@ def represent_by(
     clusters = _clusters(members, kept, digests, features)
     weights = joint_weights(alignment.weights)
     similarities: dict[int, FloatArray] = {}
-    for group in _groups(clusters, room):
+    for group in groups_within(clusters, room):
         similarities |= _similarities(group, features, weights)
     chosen = _chosen(clusters, similarities, inside, places)
 
@@ -199,19 +200,6 @@ def _clusters(
     ]
 
 
-def _groups(clusters: Sequence[_Cluster], room: int) -> Iterator[list[_Cluster]]:
-    """Divide clusters into groups, each within the room or of one cluster."""
-    group: list[_Cluster] = []
-    for one in clusters:
-        wider = [*group, one]
-        if group and sum(of.held for of in wider) + max(of.work for of in wider) > room:
-            yield group
-            wider = [one]
-        group = wider
-    if group:
-        yield group
-
-
 def _similarities(group: Sequence[_Cluster], features: Parts, weights: FloatArray) -> dict[int, FloatArray]:
     """Compute the similarity index of the clips of some clusters, reading the features once."""
     poses = {one.cluster_id: np.empty((len(one.clip_ids), one.frames, POSE_COLUMNS), np.float32)
@@ -251,8 +239,8 @@ def _frames_of(clip_ids: Collection[str], features: Parts) -> dict[str, pa.Chunk
     if clip_ids:
         for part in features.read(["clip_id", "feature"]):
             for clip_id, rows in per_clip(part).items():
-                if clip_id in clip_ids:  # copied: a slice would keep the whole part
-                    found[clip_id] = rows["feature"].take(np.arange(len(rows)))
+                if clip_id in clip_ids:
+                    found[clip_id] = copied(rows)["feature"]
     return found
 
 

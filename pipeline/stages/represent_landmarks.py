@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from motionary.pipeline.clustering.landmark_steps import LEAST_LANDMARKS, sample_clips
 from motionary.pipeline.config import AlignmentConfig, ClusterConfig, DistanceConfig
 from motionary.pipeline.parts import Parts
-from motionary.pipeline.stages.clip_frames import Measure, frames_by_clip, frames_of
+from motionary.pipeline.stages.clip_frames import Measure, frames_of
 from motionary.pipeline.stages.clustered_pairs import rounded
-from motionary.pipeline.stages.columns import places_by_clip
+from motionary.pipeline.stages.columns import matrices_by_clip, places_by_clip
 from motionary.pipeline.stages.compare import thresholds_of
 from motionary.pipeline.stages.represent import digests_of, represent_by
 
@@ -74,7 +74,7 @@ class _ComparedInside:
         representing = frames_of(self.resampled, [ids[place] for place in np.unique(reference).tolist()])
         for part in self.resampled.read(["clip_id", "feature"]):
             together: dict[int, dict[int, NDArray]] = {}
-            for clip_id, frames in frames_by_clip(part).items():
+            for clip_id, frames in matrices_by_clip(part).items():
                 place = places[clip_id]
                 if reference[place] != place:
                     together.setdefault(int(reference[place]), {})[place] = frames

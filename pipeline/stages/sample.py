@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pyarrow as pa
 
 from motionary.pipeline.parts import Parts
-from motionary.pipeline.stages.columns import per_clip
+from motionary.pipeline.stages.columns import copied, per_clip
 from motionary.pipeline.tables import TABLES
 
 VERSION = 1
@@ -34,7 +33,6 @@ def sample(resampled: Parts, clip_ids: Sequence[str]) -> dict[str, pa.Table]:
     for part in resampled.read():
         clips = per_clip(part)
         for clip_id in clips.keys() & set(clip_ids):
-            rows = clips[clip_id]
-            found[clip_id] = rows.take(np.arange(len(rows)))  # copied: a slice would keep the whole part
+            found[clip_id] = copied(clips[clip_id])
     rows = [found[clip_id] for clip_id in clip_ids if clip_id in found]
     return {"sampled": pa.concat_tables([TABLES["sampled"].empty_table(), *rows])}

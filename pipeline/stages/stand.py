@@ -11,7 +11,7 @@ from motionary.pipeline.clustering.primary import merge_key
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.clip_frames import channels_of
-from motionary.pipeline.stages.columns import mapped_distances, per_clip
+from motionary.pipeline.stages.columns import copied, mapped_distances, per_clip
 from motionary.pipeline.tables import TABLES
 
 VERSION = 1
@@ -50,8 +50,8 @@ def stand(groups: pa.Table, pairs: Parts, sampled: Parts, config: ClusterConfig)
     frames: dict[str, pa.ChunkedArray] = {}
     for part in sampled.read(["clip_id", "feature"]):
         for clip_id, rows in per_clip(part).items():
-            if clip_id in group_of:  # copied: a slice would keep the whole part
-                frames[clip_id] = rows["feature"].take(np.arange(len(rows)))
+            if clip_id in group_of:
+                frames[clip_id] = copied(rows)["feature"]
     rows = [_rows(group, clip_id, frames[clip_id]) for clip_id, group in group_of.items()]
     return {"standing": pa.concat_tables(rows)}
 

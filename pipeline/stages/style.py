@@ -25,6 +25,7 @@ from motionary.pipeline.canonical import CANONICAL_JOINTS, Convention
 from motionary.pipeline.motion import FloatArray, Motion
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.columns import per_clip
+from motionary.pipeline.stages.groups import groups_within
 from motionary.pipeline.stages.motions import read_motion_rows
 from motionary.pipeline.style import Residual, StyleSpace, residuals
 from motionary.pipeline.style.residual import ResidualKind
@@ -63,6 +64,11 @@ class _Cluster:
     def held(self) -> int:
         """Bytes of its vectors and its reference."""
         return self.vectors + self.frames * (32 * self.joints + 24)
+
+    @property
+    def work(self) -> int:
+        """Bytes that its analysis takes beside them."""
+        return _ANALYSIS * self.vectors
 
     @property
     def vectors(self) -> int:
@@ -116,7 +122,7 @@ def style(
     for clip_id, cluster_id in zip(clip_ids, cluster_ids, strict=True):
         if clip_id in clips:
             members.setdefault(cluster_id, []).append(clip_id)
-    for group in _groups(_clusters(members, reference_of, clips, aligned), room):
+    for group in groups_within(_clusters(members, reference_of, clips, aligned), room):
         made += _subtracted(group, clips, aligned, conventions, frame_rate)
     every = pa.concat_tables(made)
     place = {clip_id: i for i, clip_id in enumerate(every["clip_id"].to_pylist())}
@@ -175,19 +181,6 @@ def _clusters(
         )
         for cluster_id, clip_ids in members.items()
     ]
-
-
-def _groups(clusters: Sequence[_Cluster], room: int) -> Iterator[list[_Cluster]]:
-    """Divide clusters into groups, each within the room or of one cluster."""
-    group: list[_Cluster] = []
-    for one in clusters:
-        wider = [*group, one]
-        if group and sum(of.held for of in wider) + _ANALYSIS * max(of.vectors for of in wider) > room:
-            yield group
-            wider = [one]
-        group = wider
-    if group:
-        yield group
 
 
 def _subtracted(
