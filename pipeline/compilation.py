@@ -137,7 +137,8 @@ def _call_every_kernel() -> None:
     explain_pair(clips[0], clips[1], feature_parts("pose+travel"))
     find_occurrences(clips[0], pack_takes(clips), 1)
     pairwise_under(clips, mu=1.0)
-    complete_linkage_under(3, np.array([0, 0]), np.array([1, 2]), pairs.weighted[:2].astype(np.float32))
+    near = np.array([0, 0]), np.array([1, 2]), pairs.weighted[:2].astype(np.float32)
+    complete_linkage_under(3, lambda: [near])
     for values in (pairs.weighted, pairs.weighted.astype(np.float32)):
         complete_linkage(values)
         nearest_neighbour_graph(values)

@@ -1,4 +1,4 @@
-"""The Dask graph: which stage feeds which. Wiring, no mathematics.
+"""The graph: which stage feeds which. Wiring, no mathematics; `dask_graph.py` writes it as Dask wants it.
 
     files -> ingest (a batch) -> resample -> compare (two sides) -> cluster -> identify
              identify -> represent
@@ -16,15 +16,13 @@ caller gives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import pyarrow as pa
-from dask.task_spec import List, TaskRef
-from dask.task_spec import Task as DaskTask
 
 from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.layout import Clip, Earlier, Layout, digest_of_settings
@@ -43,41 +41,13 @@ from motionary.pipeline.stages import (
     resample,
     style,
 )
-from motionary.pipeline.task import MAKES, OF_LANDMARKS, IsStored, TableStore, Task, TaskReport, run_task
+from motionary.pipeline.task import MAKES, OF_LANDMARKS, IsStored, Task
 
 Load = Callable[..., pa.Table]
 """Given a result's key, a table and maybe columns, what `TableStore.load` returns."""
 
 ROOM = 1 << 30
 """Bytes that a task may hold, unless the caller says otherwise."""
-
-
-def dask_graph(
-    tasks: Iterable[Task],
-    store: TableStore,
-    run: Callable[[Task, TableStore, Sequence[TaskReport]], TaskReport] = run_task,
-    suffix: str = "",
-) -> dict[str, DaskTask]:
-    """Write tasks as Dask wants them; each computes to its `TaskReport`.
-
-    Parameters
-    ----------
-    tasks : iterable of Task
-    store : TableStore
-        Where results are.
-    run : callable
-        What runs one.
-    suffix : str
-        Ends their names: a scheduler takes tasks of one name for one, be they for two stores or not.
-    """
-    names = {task.key: f"{task.stage}-{task.key}{suffix}" for task in tasks}
-    return {
-        names[task.key]: DaskTask(
-            names[task.key], run, task, store,
-            List(*(TaskRef(names[key]) for key in task.after if key in names)),
-        )
-        for task in tasks
-    }  # fmt: skip
 
 
 class Grouped(NamedTuple):

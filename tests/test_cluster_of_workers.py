@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_info
 
 from motionary.catalog.store import Store
 from motionary.pipeline.config import DistanceConfig, PipelineConfig
-from motionary.pipeline.graph import dask_graph
+from motionary.pipeline.dask_graph import dask_graph
 from motionary.pipeline.readers.library import scan_library
 from motionary.pipeline.task import Task, run_task
 from motionary.workflows import crew

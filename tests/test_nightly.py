@@ -245,6 +245,14 @@ def test_two_nights(library, motionary, tmp_path):
     assert "walk/<wbr>broken.bvh" in page
 
 
+def test_what_a_run_remarks_is_logged(library, motionary, tmp_path):
+    file = configuration(tmp_path, '[distances]\npairs = "landmarks"')
+    assert motionary("nightly", file)[0] == 0
+    assert "compares all pairs: landmarks are for more than 8 clips" in [
+        line["text"] for line in logged(tmp_path, "remark")
+    ]
+
+
 def test_a_page_can_be_left_out(library, motionary, tmp_path):
     file = configuration(tmp_path, "[report]\nhtml = false")
     assert motionary("nightly", file)[0] == 0

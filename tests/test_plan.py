@@ -16,6 +16,7 @@ from motionary.pipeline.readers.library import FileState, Source
 from motionary.pipeline.task import MAKES, OF_LANDMARKS
 from motionary.workflows.costs.amounts import Amounts, clip_sizes
 from motionary.workflows.costs.calibration import Calibration, Share, Tile, calibrate
+from motionary.workflows.costs.disk import refuse_small_disks
 from motionary.workflows.costs.made_up import Squares
 from motionary.workflows.costs.memory import need_of, refuse
 from motionary.workflows.costs.model import foretold_by, with_seconds
@@ -127,6 +128,22 @@ def test_a_run_for_which_a_disk_is_too_small_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("full", ["catalog", "temporary"])
+def test_a_disk_too_small_for_all_pairs_has_fewer_proposed(full, demo_library, tmp_path, monkeypatch):
+    ready = prepare(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig()))
+    many = replace(ready.plan, to_compare=10_000 * 9_999 // 2)
+    need = need_of(amounts(10_000), 2, 64 * GIB)
+    usage = namedtuple("usage", "free")
+    monkeypatch.setattr(
+        "motionary.workflows.costs.disk.shutil.disk_usage",
+        lambda path: usage(10**8 if (Path(path) == tmp_path) == (full == "catalog") else 10**12),
+    )
+    with pytest.raises(UserError, match="or compare fewer pairs: --landmarks auto"):
+        refuse_small_disks(ready.store, amounts(10_000), many, need)
+    near = replace(amounts(10_000), pruned=True)
+    refuse_small_disks(ready.store, near, many, need_of(near, 2, 64 * GIB))
+
+
 def library(sizes) -> Layout:
     names = [f"{number:05d}.bvh" for number in range(len(sizes))]
     sources = [
@@ -200,6 +217,15 @@ def test_landmarks_are_foretold_to_take_less(demo_library, tmp_path):
     assert other.plan.to_compare == 20 * 19 // 2 + 80 * 20 // 2
     assert other.seconds < one.seconds
     assert other.disk < one.disk
+
+
+def test_what_near_pairs_take_is_not_known_before(demo_library, tmp_path):
+    config = PipelineConfig(
+        clusters=ClusterConfig(primary="complete", threshold=0.2), distances=DistanceConfig(pairs="pruned")
+    )
+    told = foretold_by(prepare(Job([str(demo_library)], str(tmp_path / "out"), config)), MEASURED)
+    assert told.memory.scratch == 0
+    assert "by how many pairs prove to be near" in str(told)
 
 
 def test_work_grows_with_what_was_measured(ready):

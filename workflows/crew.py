@@ -127,8 +127,9 @@ def _of_killed(error: KilledWorker, tasks: Sequence[Task]) -> str:
     times = error.allowed_failures + 1
     return (
         f"one task of stage {stage}{which} was the end of {times} worker{'s' * (times > 1)}: most often "
-        "the system ends them for want of memory; give each worker more, or say with --memory what it has. "
-        "What is done is stored, and the same command goes on from there"
+        "the system ends them for want of memory; give each worker more, or say with --memory what it has, "
+        "and start workers with --memory-limit 0, for Dask's own limit counts mapped files. What is done is "
+        "stored, and the same command goes on from there"
     )
 
 

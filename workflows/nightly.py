@@ -107,6 +107,7 @@ def _run(settings: NightlySettings, log: RunLog, report: RunReport, store: Store
             take_over=lambda dead: log("took_over", process=str(dead)),
             planned=partial(_planned, log, report),
             check=partial(_check, settings, log, report),
+            remark=lambda text: log("remark", text=text),
         )
     except BaseException:
         # What comes right after publishing, such as SIGTERM, leaves the catalog new all the same.

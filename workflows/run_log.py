@@ -5,6 +5,7 @@
 | started | config, catalog, libraries, version |
 | took_over | process (a writer that died) |
 | compiling | |
+| remark | text: how many workers there are, when that changes; what was set and is not done |
 | planned | new, changed, renamed, removed, unchanged, and what there is to do |
 | stage | stage, tasks, seconds (since the step of the graph began that the stage belongs to) |
 | labels_outside | count, first |

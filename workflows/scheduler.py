@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from motionary.pipeline.compilation import KernelCacheError, compile_kernels
-from motionary.pipeline.graph import dask_graph
+from motionary.pipeline.dask_graph import dask_graph
 from motionary.pipeline.task import TableStore, Task, TaskReport, run_task
 from motionary.workflows.crew import Crew, Remark, SchedulerError, explained
 from motionary.workflows.dashboard import dashboard_hint

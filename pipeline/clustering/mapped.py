@@ -11,13 +11,15 @@ import os
 import tempfile
 from collections.abc import Callable
 from math import prod
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 NewArray = Callable[[tuple[int, ...], DTypeLike], NDArray[Any]]
 """Makes an array whose contents do not matter yet: `numpy.empty` in memory, `mapped_array` in a file."""
+
+_BLOCK = 1 << 24
 
 
 def mapped_array(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
@@ -34,7 +36,7 @@ def mapped_array(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         return np.empty(shape, dtype)
     with tempfile.TemporaryFile(prefix="motionary-") as file:
         try:
-            os.posix_fallocate(file.fileno(), 0, size)
+            _reserve(file, size)
         except OSError as error:
             folder = tempfile.gettempdir()
             raise OSError(
@@ -43,3 +45,12 @@ def mapped_array(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
                 "set TMPDIR to a folder of a larger disk",
             ) from error
         return np.asarray(np.memmap(file, dtype, "r+", shape=shape))
+
+
+def _reserve(file: IO[bytes], size: int) -> None:
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file.fileno(), 0, size)
+        return
+    for begin in range(0, size, _BLOCK):  # macOS, Windows: what has been written is there
+        file.write(bytes(min(_BLOCK, size - begin)))
+    file.flush()

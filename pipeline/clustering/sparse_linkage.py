@@ -7,7 +7,8 @@ of `linkage_kernels.py` therefore runs over the known pairs alone, in sparse row
     d(I+J, K) = max(d(I, K), d(J, K)) where both are known, else unknown                          eq. 9
 
 A merged row is part of the kept cluster's own row, so everything happens in place: 16 bytes a pair of float32
-for the rows, where the dense matrix takes N^2 / 2 values.
+for the rows, where the dense matrix takes N^2 / 2 values. The pairs are read twice, part after part: once to
+measure the rows, once to fill them. So nothing holds the pairs beside the rows, and these may be mapped.
 
 Ties are decided as the dense kernel decides them (the lowest index wins, save that the chain's last link
 comes first) when it is given the same distances and one value above mu for all unknown pairs: same rows, same
@@ -18,14 +19,19 @@ tie by way of distances above mu, which nobody knows here.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
 
 from motionary.pipeline.clustering.cut import clusters_after
 from motionary.pipeline.clustering.linkage import relabelled
+from motionary.pipeline.clustering.mapped import NewArray
+
+KnownPairs = tuple[ArrayLike, ArrayLike, ArrayLike]
+"""The clips `first` and `second` of some pairs, by their places, and the pairs' distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +51,7 @@ class SparseLinkage:
 
 
 def complete_linkage_under(
-    clips: int, first: ArrayLike, second: ArrayLike, distances: ArrayLike
+    clips: int, read: Callable[[], Iterable[KnownPairs]], new_array: NewArray = np.empty
 ) -> SparseLinkage:
     """Merge the clusters whose furthest clips are nearest, as long as all distances between them are known.
 
@@ -53,10 +59,12 @@ def complete_linkage_under(
     ----------
     clips : int
         N.
-    first, second : array (pairs,) of int
-        Places of the clips of every pair that is known, each pair once, in either order.
-    distances : array (pairs,)
-        Finite, not negative; in float32 they take half the memory.
+    read : callable
+        Begins to read the pairs that are known, part after part; called twice. Of every part: the places of
+        both clips of every pair, in either order and each pair once in all parts; and the distances, finite
+        and not negative. In float32 they take half the memory.
+    new_array : callable
+        Makes the rows: `numpy.empty`, or `mapped_array` where they may not fit into memory.
 
     Returns
     -------
@@ -71,40 +79,63 @@ def complete_linkage_under(
     """
     from motionary.pipeline.clustering.sparse_linkage_kernels import sparse_chain
 
-    rows = _rows(clips, first, second, distances)
-    starts, counts = rows.indptr[:-1], np.diff(rows.indptr)
-    merged, heights = sparse_chain(starts, counts, rows.indices, rows.data)
+    merged, heights = sparse_chain(*_rows(clips, lambda: _checked(clips, read()), new_array))
     order = np.argsort(heights, kind="stable")
     merges = relabelled(merged[order], heights[order].astype(np.float64), clips)
     return SparseLinkage(merges, clusters_after(merges, clips))
 
 
-def _rows(clips: int, first: ArrayLike, second: ArrayLike, distances: ArrayLike) -> csr_array:
-    """Check the pairs, and lay them out as rows with ascending columns, each pair in both of its rows."""
-    i, j, values = np.asarray(first), np.asarray(second), np.asarray(distances)
-    if not i.shape == j.shape == values.shape == (len(values),):
-        raise ValueError(
-            f"first, second and distances have shapes {i.shape}, {j.shape}, {values.shape}; give one a pair"
-        )
-    if values.dtype != np.float32:
-        values = values.astype(np.float64)
-    wrong = ~((i >= 0) & (j >= 0) & (i < clips) & (j < clips) & (i != j))
-    if wrong.any():
-        pair = int(np.argmax(wrong))
-        raise ValueError(
-            f"pair {pair} is of clips {i[pair]} and {j[pair]}; there must be two, numbered 0 to {clips - 1}"
-        )
-    wrong = ~(np.isfinite(values) & (values >= 0))
-    if wrong.any():
-        pair = int(np.argmax(wrong))
-        raise ValueError(
-            f"the distance of clips {i[pair]} and {j[pair]} is {values[pair]}; "
-            "distances must be finite and not negative"
-        )
-    places = np.concatenate([i, j]), np.concatenate([j, i])
-    rows = coo_array((np.concatenate([values, values]), places), shape=(clips, clips)).tocsr()
-    if rows.nnz != 2 * len(values):
-        repeated = len(values) - rows.nnz // 2
-        raise ValueError(f"{repeated} of {len(values)} pairs are given again; give each once")
-    rows.sort_indices()
-    return rows
+def _rows(
+    clips: int, read: Callable[[], Iterator[tuple[NDArray[Any], ...]]], new_array: NewArray
+) -> tuple[NDArray[Any], ...]:
+    """Lay the pairs out as rows with ascending columns, each pair in both of its rows.
+
+    Returns
+    -------
+    starts, counts : array (N,) of int64
+        Where the row of every clip begins and how long it is.
+    columns, values : array (2 pairs,)
+        Who is known, and how far away.
+    """
+    from motionary.pipeline.clustering.sparse_linkage_kernels import fill_rows, sort_rows
+
+    counts, dtype = np.zeros(clips, np.int64), np.dtype(np.float32)
+    for first, second, distances in read():
+        counts += np.bincount(first, minlength=clips) + np.bincount(second, minlength=clips)
+        dtype = np.result_type(dtype, distances)
+    starts = np.cumsum(counts) - counts
+    columns, values = new_array((int(counts.sum()),), np.int32), new_array((int(counts.sum()),), dtype)
+    ends = starts.copy()
+    for first, second, distances in read():
+        fill_rows(ends, columns, values, first, second, distances)
+    row, column = sort_rows(starts, counts, columns, values)
+    if row >= 0:
+        raise ValueError(f"the pair of clips {row} and {column} is given again; give each once")
+    return starts, counts, columns, values
+
+
+def _checked(clips: int, parts: Iterable[KnownPairs]) -> Iterator[tuple[NDArray[Any], ...]]:
+    for part in parts:
+        i, j, values = map(np.asarray, part)
+        if not i.shape == j.shape == values.shape == (len(values),):
+            raise ValueError(
+                f"first, second and distances have shapes {i.shape}, {j.shape}, {values.shape}; "
+                "give one a pair"
+            )
+        if values.dtype != np.float32:
+            values = values.astype(np.float64)
+        wrong = ~((i >= 0) & (j >= 0) & (i < clips) & (j < clips) & (i != j))
+        if wrong.any():
+            pair = int(np.argmax(wrong))
+            raise ValueError(
+                f"pair {pair} is of clips {i[pair]} and {j[pair]}; "
+                f"there must be two, numbered 0 to {clips - 1}"
+            )
+        wrong = ~(np.isfinite(values) & (values >= 0))
+        if wrong.any():
+            pair = int(np.argmax(wrong))
+            raise ValueError(
+                f"the distance of clips {i[pair]} and {j[pair]} is {values[pair]}; "
+                "distances must be finite and not negative"
+            )
+        yield i.astype(np.int64, copy=False), j.astype(np.int64, copy=False), values

@@ -1,9 +1,32 @@
-"""The compiled nearest-neighbour chain over sparse rows: see `pipeline/clustering/sparse_linkage.py`."""
+"""The compiled nearest-neighbour chain over sparse rows, and their making: see `sparse_linkage.py`."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+
+@njit(nogil=True, cache=True)
+def fill_rows(ends, columns, values, first, second, distances):  # type: ignore[no-untyped-def]
+    """Append every pair to the rows of both clips; `ends`, where each row ends so far, moves on."""
+    for pair in range(len(first)):
+        i, j = first[pair], second[pair]
+        for row, column in ((i, j), (j, i)):
+            columns[ends[row]], values[ends[row]] = column, distances[pair]
+            ends[row] += 1
+
+
+@njit(nogil=True, cache=True)
+def sort_rows(starts, counts, columns, values):  # type: ignore[no-untyped-def]
+    """Sort every row by its columns. Returns a row and a column that it holds twice, or -1 and -1."""
+    for row in range(len(starts)):
+        here = slice(starts[row], starts[row] + counts[row])
+        order = np.argsort(columns[here])
+        columns[here], values[here] = columns[here][order], values[here][order]
+        for place in range(starts[row] + 1, starts[row] + counts[row]):
+            if columns[place] == columns[place - 1]:
+                return row, np.int64(columns[place])
+    return -1, np.int64(-1)
 
 
 @njit(nogil=True, cache=True)

@@ -6,11 +6,12 @@ mu, need the other pairs: of the dendrograms there is none, of the partitions th
 
 from __future__ import annotations
 
-import numpy as np
-import pyarrow as pa
-from numpy.typing import NDArray
+from collections.abc import Iterator, Mapping
 
-from motionary.pipeline.clustering.sparse_linkage import complete_linkage_under
+import pyarrow as pa
+
+from motionary.pipeline.clustering.mapped import mapped_array
+from motionary.pipeline.clustering.sparse_linkage import KnownPairs, complete_linkage_under
 from motionary.pipeline.config import ClusterConfig
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.cluster import classes_of, groups_table, join_labels, partition_rows, scores
@@ -28,7 +29,8 @@ def cluster_pruned(
     ingested, labels, overrides : pyarrow.Table
         As for `motionary.pipeline.stages.cluster.cluster`.
     pairs : Parts
-        Every pair whose weighted distance is at most the threshold; 20 bytes of each are held.
+        Every pair whose weighted distance is at most the threshold; 16 bytes of each are held, in temporary
+        files.
     config : ClusterConfig
         The threshold, and the label column.
 
@@ -39,8 +41,8 @@ def cluster_pruned(
         distance.
     """
     clips = join_labels(ingested.sort_by("clip_id"), labels)
-    first, second, distances = _near(pairs, clips["clip_id"])
-    clusters = complete_linkage_under(len(clips), first, second, distances).clusters
+    place_of = places_by_clip(clips["clip_id"])
+    clusters = complete_linkage_under(len(clips), lambda: _near(pairs, place_of), mapped_array).clusters
     kappa = int(clusters.max(initial=-1)) + 1
     row = {
         "method": "complete",
@@ -63,13 +65,7 @@ def cluster_pruned(
     }
 
 
-def _near(
-    pairs: Parts, clip_ids: pa.ChunkedArray
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
-    """Return the places of both clips of every pair, and their weighted distance."""
-    place_of = places_by_clip(clip_ids)
-    found = [(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.float32))]
+def _near(pairs: Parts, place_of: Mapping[str, int]) -> Iterator[KnownPairs]:
+    """Return of every part the places of both clips of every pair, and their weighted distance."""
     for part in pairs.read(["clip_a", "clip_b", "weighted"]):
-        found.append((*pair_places(part, place_of), part["weighted"].to_numpy()))
-    first, second, distances = (np.concatenate(column) for column in zip(*found, strict=True))
-    return first, second, distances
+        yield *pair_places(part, place_of), part["weighted"].to_numpy()

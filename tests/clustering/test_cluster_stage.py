@@ -171,3 +171,12 @@ def test_a_full_disk_is_named_before_a_page_is_touched(folder, monkeypatch):
         mapped_array((10**9,), np.float64)
     assert refused.value.errno == errno.ENOSPC
     assert [*folder.iterdir()] == []
+
+
+def test_where_files_cannot_be_reserved_they_are_written(folder, monkeypatch):
+    monkeypatch.delattr("os.posix_fallocate")
+    monkeypatch.setattr("motionary.pipeline.clustering.mapped._BLOCK", 1000)
+    made = mapped_array((3, 411), np.float64)
+    assert (made.shape, made.dtype) == ((3, 411), np.float64)
+    assert not made.any()
+    assert [*folder.iterdir()] == []

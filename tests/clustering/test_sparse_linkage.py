@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from motionary.pipeline.clustering import complete_linkage, cut_tree
+from motionary.pipeline.clustering.mapped import mapped_array
 from motionary.pipeline.clustering.sparse_linkage import complete_linkage_under
 from tests.clustering import naive
 
@@ -23,6 +24,12 @@ def pairs_under(clips, condensed, mu):
     known = rng.permutation(np.flatnonzero(condensed <= mu))
     first, second = rng.permuted(places[known], axis=1).T
     return first, second, condensed[known]
+
+
+def linked(clips, first, second, distances, parts=1, new_array=np.empty):
+    """`complete_linkage_under` of pairs that come in parts."""
+    some = [*zip(*(np.array_split(one, parts) for one in (first, second, distances)), strict=True)]
+    return complete_linkage_under(clips, lambda: iter(some), new_array)
 
 
 def random_distances(clips, seed, kind):
@@ -49,11 +56,14 @@ def assert_is_the_dense_route(found, condensed, mu):
     kind=st.sampled_from(["free", "tied", "points"]),
     share=st.floats(0, 1),
     dtype=st.sampled_from([np.float32, np.float64]),
+    parts=st.integers(1, 4),
 )
-def test_it_is_the_dense_route_with_one_distance_for_all_that_is_unknown(clips, seed, kind, share, dtype):
+def test_it_is_the_dense_route_with_one_distance_for_all_that_is_unknown(
+    clips, seed, kind, share, dtype, parts
+):
     condensed = random_distances(clips, seed, kind).astype(dtype)
     mu = np.quantile(condensed, share)
-    found = complete_linkage_under(clips, *pairs_under(clips, condensed, mu))
+    found = linked(clips, *pairs_under(clips, condensed, mu), parts)
     assert_is_the_dense_route(found, np.where(condensed <= mu, condensed, dtype(FAR)), mu)
 
 
@@ -62,9 +72,7 @@ def test_it_is_the_dense_route_with_one_distance_for_all_that_is_unknown(clips, 
 def test_without_ties_what_is_unknown_does_not_matter(clips, seed, share):
     condensed = random_distances(clips, seed, "free")
     mu = np.quantile(condensed, share)
-    assert_is_the_dense_route(
-        complete_linkage_under(clips, *pairs_under(clips, condensed, mu)), condensed, mu
-    )
+    assert_is_the_dense_route(linked(clips, *pairs_under(clips, condensed, mu)), condensed, mu)
 
 
 @settings(max_examples=100, deadline=None)
@@ -72,7 +80,7 @@ def test_without_ties_what_is_unknown_does_not_matter(clips, seed, share):
 def test_with_ties_every_merge_is_still_the_nearest_pair_and_none_is_left(clips, seed, share):
     condensed = random_distances(clips, seed, "tied")
     mu = np.quantile(condensed, share)
-    found = complete_linkage_under(clips, *pairs_under(clips, condensed, mu))
+    found = linked(clips, *pairs_under(clips, condensed, mu))
     key = naive.complete_key(naive.square(condensed, clips))
     clusters = {clip: frozenset([clip]) for clip in range(clips)}
     for row, (left, right, height, size) in enumerate(found.merges):
@@ -91,7 +99,7 @@ def test_a_tie_may_hang_on_what_is_unknown():
     for to_1, to_3 in ((5.0, 6.0), (6.0, 5.0)):
         condensed = np.array([to_1, 9.0, to_3, 1.0, 2.0, 1.0])
         outcomes[to_1] = naive.as_partition(cut_tree(complete_linkage(condensed), threshold=1))
-        sparse = complete_linkage_under(4, *pairs_under(4, condensed, 1))
+        sparse = linked(4, *pairs_under(4, condensed, 1))
         assert naive.as_partition(sparse.clusters) == {frozenset({0}), frozenset({1, 2}), frozenset({3})}
     assert outcomes[5.0] != outcomes[6.0]
 
@@ -103,22 +111,22 @@ def test_many_clips_in_many_clusters(dtype):
     i, j = np.triu_indices(600, 1)
     condensed = np.linalg.norm(points[i] - points[j], axis=1).astype(dtype)
     mu = 2.5
-    found = complete_linkage_under(600, *pairs_under(600, condensed, mu))
+    found = linked(600, *pairs_under(600, condensed, mu), 5, mapped_array)
     assert 30 < found.clusters.max() < 200
     assert_is_the_dense_route(found, condensed.astype(np.float64), mu)
 
 
 def test_clips_that_know_nobody_are_clusters_of_their_own():
-    found = complete_linkage_under(4, [], [], [])
+    found = linked(4, [], [], [])
     assert found.merges.shape == (0, 4)
     assert_array_equal(found.clusters, [0, 1, 2, 3])
-    assert complete_linkage_under(0, [], [], []).clusters.shape == (0,)
-    assert_array_equal(complete_linkage_under(3, [2], [1], [0.0]).clusters, [1, 0, 0])
+    assert linked(0, [], [], []).clusters.shape == (0,)
+    assert_array_equal(linked(3, [2], [1], [0.0]).clusters, [1, 0, 0])
 
 
 def test_the_input_is_left_as_it_is():
     first, second, distances = np.array([0, 1]), np.array([1, 2]), np.array([1, 1], np.float32)
-    complete_linkage_under(3, first, second, distances)
+    linked(3, first, second, distances)
     assert_array_equal(np.concatenate([first, second, distances]), [0, 1, 1, 2, 1, 1])
 
 
@@ -128,7 +136,7 @@ def test_the_input_is_left_as_it_is():
         (([0], [0], [1.0]), "pair 0 is of clips 0 and 0; there must be two, numbered 0 to 2"),
         (([0, 1], [1, 3], [1.0, 1.0]), "pair 1 is of clips 1 and 3"),
         (([0, -1], [1, 2], [1.0, 1.0]), "pair 1 is of clips -1 and 2"),
-        (([0, 1], [1, 0], [1.0, 1.0]), "1 of 2 pairs are given again"),
+        (([0, 1], [1, 0], [1.0, 1.0]), "the pair of clips 0 and 1 is given again"),
         (([0], [1], [np.nan]), "the distance of clips 0 and 1 is nan"),
         (([0], [1], [-1.0]), "the distance of clips 0 and 1 is -1.0"),
         (([0], [1, 2], [1.0]), r"shapes \(1,\), \(2,\), \(1,\)"),
@@ -136,4 +144,4 @@ def test_the_input_is_left_as_it_is():
 )
 def test_wrong_pairs_are_named(pairs, message):
     with pytest.raises(ValueError, match=message):
-        complete_linkage_under(3, *pairs)
+        linked(3, *pairs)

@@ -219,8 +219,17 @@ def raw(client, head: str, body: bytes = b"") -> socket.socket:
 
 
 def answer_on(connection: socket.socket) -> str:
-    """Read all until the server closes the connection, as it does where it did not read all."""
-    return b"".join(iter(lambda: connection.recv(65536), b"")).decode()
+    """Read one answer; what the server did not read of the file may keep the connection open after it."""
+    got = b""
+    while not _whole(got) and (more := connection.recv(65536)):
+        got += more
+    return got.decode()
+
+
+def _whole(answer: bytes) -> bool:
+    head, ended, body = answer.partition(b"\r\n\r\n")
+    size = re.search(rb"(?i)content-length: (\d+)", head)
+    return bool(ended and size) and len(body) >= int(size[1])
 
 
 def announced(size: int) -> str:

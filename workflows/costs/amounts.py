@@ -30,6 +30,8 @@ class Amounts:
         Bytes of all files.
     landmarks : int, optional
         Clips all pairs of which are compared, where those of all are not.
+    pruned : bool
+        Whether only near pairs are kept; how many that are is known when they are compared.
     """
 
     clips: int
@@ -38,9 +40,10 @@ class Amounts:
     tile: int
     library: int
     landmarks: int | None = None
+    pruned: bool = False
 
     @staticmethod
-    def of(layout: Layout, landmarks: int | None = None) -> Amounts:
+    def of(layout: Layout, landmarks: int | None = None, *, pruned: bool = False) -> Amounts:
         """Read them off a library's layout."""
         sizes = clip_sizes(layout)
         batches = [sum(sizes[clip.clip_id] for clip in batch) for batch in layout.batches]
@@ -52,6 +55,7 @@ class Amounts:
             tile=sides[0] * sides[min(1, len(sides) - 1)] if sides else 0,
             library=sum(batches),
             landmarks=landmarks,
+            pruned=pruned,
         )
 
     @property

@@ -9,6 +9,7 @@ from pathlib import Path
 from fsspec.implementations.local import LocalFileSystem
 
 from motionary.catalog.store import Store
+from motionary.pipeline.clustering.landmark_steps import landmark_count
 from motionary.workflows.costs.amounts import Amounts
 from motionary.workflows.costs.memory import Need
 from motionary.workflows.costs.sizes import size_text
@@ -20,9 +21,9 @@ _OF_PAIR, _OF_BYTE = 40.0, 0.65
 
 
 def needed_bytes(amounts: Amounts, plan: Plan) -> int:
-    """Say about how much a run writes: of the clips that are read, and of the pairs that are compared."""
+    """Say about how much a run writes: of the clips that are read, and of the pairs that are kept."""
     read = amounts.library * plan.to_read / max(amounts.clips, 1)
-    return round(_OF_BYTE * read + _OF_PAIR * plan.to_compare)
+    return round(_OF_BYTE * read + _OF_PAIR * plan.to_compare * (not amounts.pruned))
 
 
 def refuse_small_disks(store: Store, amounts: Amounts, plan: Plan, need: Need) -> None:
@@ -37,15 +38,21 @@ def refuse_small_disks(store: Store, amounts: Amounts, plan: Plan, need: Need) -
     if free is not None and needed > free:
         raise UserError(
             f"the run writes about {size_text(needed)} and {size_text(free)} is free at {store.url}; make "
-            "room there, or name a catalog on a larger disk"
+            f"room there, or name a catalog on a larger disk{_fewer_pairs(amounts)}"
         )
     folder = tempfile.gettempdir()
     free = shutil.disk_usage(folder).free
     if plan.to_compare and need.scratch > free:
         raise UserError(
             f"clustering takes {size_text(need.scratch)} of temporary files and {size_text(free)} is free at "
-            f"{folder}; make room there, or set TMPDIR to a folder of a larger disk"
+            f"{folder}; make room there, or set TMPDIR to a folder of a larger disk{_fewer_pairs(amounts)}"
         )
+
+
+def _fewer_pairs(amounts: Amounts) -> str:
+    if amounts.landmarks is not None or landmark_count(amounts.clips) >= amounts.clips:
+        return ""
+    return ", or compare fewer pairs: --landmarks auto"
 
 
 def free_bytes(store: Store) -> int | None:

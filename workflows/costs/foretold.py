@@ -128,12 +128,17 @@ class Foretold:
                 *self._by_workers(),
                 "",
                 f"memory: {needed_text(self.memory.bytes, self.memory.allowed)}, most of it beside the "
-                f"processes for {self.memory.largest}; {size_text(self.memory.scratch)} of temporary files",
+                f"processes for {self.memory.largest}; {self._scratch()}",
                 f"disk: {size_text(self.disk)}{free}",
                 f"from {self.sampled} clips that were tried in {self.calibration:.0f} s on this machine; "
                 "workers are taken for as fast as its cores",
             ]
         )
+
+    def _scratch(self) -> str:
+        if not self.memory.scratch:
+            return "temporary files by how many pairs prove to be near"
+        return f"{size_text(self.memory.scratch)} of temporary files"
 
     def _by_stage(self) -> list[str]:
         rows = [("stage", "tasks", "work", "memory a task", "disk")]

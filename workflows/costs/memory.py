@@ -67,6 +67,7 @@ class Need:
         What the largest task of each stage holds beside that.
     scratch : int
         Temporary files that are mapped beside that: the system drops their pages where it needs the memory.
+        0 where only near pairs are kept, for nobody knows how many.
     """
 
     bytes: int
@@ -111,7 +112,7 @@ def need_of(amounts: Amounts, workers: int, memory: int | None, scheduler: str |
     room = ROOM if allowed is None else round(min(max(allowed - base - _SLACK, _SLACK), ROOM))
     stages = {stage: round(size) for stage, size in _tasks(amounts, room).items()}
     most = max(_at_once(stage, at_once) * size for stage, size in stages.items())
-    scratch = round(_SCRATCH * amounts.clustered * (amounts.clustered - 1) / 2)
+    scratch = 0 if amounts.pruned else round(_SCRATCH * amounts.clustered * (amounts.clustered - 1) / 2)
     return Need(base + most, allowed, room, at_once, processes, base, stages, scratch)
 
 
