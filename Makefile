@@ -7,8 +7,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The peers of the benchmarks: what they pin would drag down what we stand on.
 PEERS := .venv-peers
-# Tests go to a process a core; a file of tests stays together, for what it prepares serves all of it.
-SHARED_OUT := -n auto --dist loadfile
+# Tests go to a process more than there are cores, for some wait; a file of tests stays together, for what it
+# prepares serves all of it.
+SHARED_OUT := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadfile
 SOURCES := $(shell find pipeline catalog workflows -name '*.py' -o -name 'py.typed' -o -name '*.toml' \
 	-o -name '*.js' -o -name '*.css' -o -name '*.html' -o -name '*.svg')
 PAGES := $(shell find README.md pipeline catalog workflows notebooks tests -name '*.md' -o -name '*.ipynb' -o -path '*/static/*')

@@ -217,7 +217,7 @@ def test_a_fault_inside_a_worker_is_one_line(demo_library, tmp_path):
     [
         ("select * from frames", "csv", "head -2", 2),
         ("select * from frames", "json", "head -2", 2),
-        ("select * from range(100000)", "table", "head -2", 2),
+        ("select * from range(20000)", "table", "head -2", 2),
         ("select 1", "csv", "true", 0),  # so short an answer is sent when all is done
         ("select 1", "table", "true", 0),
     ],
@@ -342,6 +342,7 @@ def test_reproduce_names_every_experiment():
     assert set(get_args(get_type_hints(reproduce)["name"])) == set(EXPERIMENTS)
 
 
+@pytest.mark.slow
 def test_reproduce_cotw_prints_its_tables_and_writes_its_values(motionary, demo_catalog):
     code, out, _ = motionary("reproduce", "cotw", demo_catalog, "--draws", 1)
     assert code == 0

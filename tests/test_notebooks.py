@@ -126,6 +126,7 @@ def test_a_catalog_is_opened_as_it_is(demo_catalog):
     assert catalog_of(demo_catalog).snapshot == Catalog.open(demo_catalog).snapshot
 
 
+@pytest.mark.slow
 def test_a_library_is_run_into_the_working_folder(demo_library, tmp_path, monkeypatch, capsys):
     library = tmp_path / "takes"
     shutil.copytree(demo_library / "walk", library / "walk")

@@ -207,6 +207,7 @@ def conducted(demo_catalog, silent_progress) -> Experiment:
     return study_dtw_curve(Catalog.open(demo_catalog), "action", 2, 0, silent_progress)
 
 
+@pytest.mark.slow
 def test_the_command_has_every_combination_and_the_same_figures_each_time(motionary, demo_catalog, conducted):
     code, out, err = motionary("reproduce", "dtw-curve", demo_catalog, "--draws", 2, "--format", "json")
     assert code == 0

@@ -27,7 +27,7 @@ def few(demo_library, tmp_path_factory) -> Path:
     return library
 
 
-@pytest.fixture(scope="module", params=["memory", "s3"])
+@pytest.fixture(scope="module", params=["memory", pytest.param("s3", marks=pytest.mark.slow)])
 def published(request, few, silent_progress) -> str:
     """Publish a library, and again with a clip less; returns the catalog's URL. Tests do not change it."""
     url = (

@@ -10,7 +10,8 @@ TRIALS = Path(__file__).parent / "torture" / "trials.py"
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("share", ["not slow", pytest.param("slow", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("share", ["not slow", "slow"])
 def test_a_share_of_torture(share):
     pytest_anew = [sys.executable, "-m", "pytest", "-q", "-m", share, str(TRIALS)]
     done = subprocess.run(pytest_anew, cwd=TRIALS.parents[2], capture_output=True, text=True, check=False)

@@ -78,6 +78,7 @@ def test_every_page_is_accessible_and_fits_a_telephone(base, page, scheme, acces
         screenshot(page, f"{name}-{scheme}-narrow")
 
 
+@pytest.mark.slow
 def test_hostile_names_run_nothing_and_fit(hostile, page, accessible, screenshot):
     said = []
     page.on("dialog", lambda one: (said.append(one.message), one.dismiss()))

@@ -44,6 +44,7 @@ def plain(text):
     return text.replace("\u2068", "").replace("\u2069", "")
 
 
+@pytest.mark.slow
 def test_hostile_names_are_shown_as_they_are(page, screenshot, hostile):
     explanation = hostile.explain(*HOSTILE)
     figures = {

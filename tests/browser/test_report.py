@@ -80,7 +80,7 @@ def test_only_so_many_players_live_at_once(opened, demo_report):
     assert page.locator(".take[aria-expanded]").count() == 6
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_charts_are_drawn_when_they_are_seen(opened, demo_report, page, screenshot, scheme):
     page.emulate_media(color_scheme=scheme)
     opened(demo_report)

@@ -49,7 +49,7 @@ def assert_is_the_dense_route(found, condensed, mu):
     assert_array_equal(found.clusters, cut_tree(Z, threshold=mu))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     clips=st.integers(2, 30),
     seed=st.integers(0, 2**16),

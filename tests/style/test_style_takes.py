@@ -79,6 +79,7 @@ def study() -> StyleStudy:
     return study_style(counted, actions=SOME_ACTIONS, methods=("UTW", "CoTW", "known warp"), strengths=(0.5,))
 
 
+@pytest.mark.slow
 def test_styles_are_predicted_better_after_cotw_than_after_utw(study):
     utw, cotw, known = (study.mean(0.5, one).value for one in ("UTW", "CoTW", "known warp"))
     assert utw < cotw
@@ -96,6 +97,7 @@ def test_so_they_are_over_all_actions_and_at_full_strength():
         assert whole.mean(strength, "CoTW", minus="UTW").value > 0
 
 
+@pytest.mark.slow
 def test_the_study_as_a_table_and_as_a_report(study):
     rows = study.to_arrow().to_pylist()
     assert len(rows) == 3 * 3

@@ -73,6 +73,7 @@ def test_without_json_stdout_is_empty(demo_catalog):
     assert process.communicate(timeout=60) == ("", "")
 
 
+@pytest.mark.slow
 def test_labels_are_changed_only_with_edit(demo_catalog, tmp_path):
     url = copied(demo_catalog, tmp_path)
     change = {"clip": "walk/walk_tired_alex_01.bvh", "label": "trudge"}
