@@ -262,6 +262,19 @@ def test_the_calibration_runs_every_stage_and_leaves_nothing(ready, tmp_path, mo
     assert told.frames == pytest.approx(frames, rel=0.2)
 
 
+@pytest.mark.parametrize("mu", [1e-9, 0.15])
+def test_the_calibration_counts_pairs_that_are_left_out(demo_library, tmp_path, mu):
+    config = PipelineConfig(
+        clusters=ClusterConfig(primary="complete", threshold=mu), distances=DistanceConfig(pairs="pruned")
+    )
+    ready = prepare(Job([str(demo_library)], str(tmp_path / "out"), config))
+    measured = calibrate(ready.graph)
+    assert measured.pairs == measured.clips * (measured.clips - 1) // 2
+    assert min(measured.tile.pair, measured.squares.passing) > 0
+    assert measured.tile.pair_disk < 20  # of some 40 bytes, where all are kept
+    assert foretold_by(ready, measured).seconds > 0
+
+
 def test_the_command_says_it_all(demo_library, motionary, monkeypatch, tmp_path):
     monkeypatch.setattr("motionary.workflows.costs.model.calibrate", lambda graph, compiling: MEASURED)
     code, out, err = motionary("plan", demo_library, "--workers", 2, "--memory", "4GB")

@@ -12,6 +12,8 @@ from motionary.catalog.views.report.page import report_page
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
+from motionary.workflows.reproduce.assign import study_assign
+from motionary.workflows.reproduce.mutual import study_mutual
 
 MU = 0.25
 
@@ -79,6 +81,12 @@ def test_it_verifies_and_answers(pruned, whole):
         assert found.table["clip_id"] == wanted.table["clip_id"]
         with pytest.raises(CatalogError, match="mutual proximity needs all pairs"):
             some.similar(clip_id, rank="mutual")
+
+
+@pytest.mark.parametrize("study", [study_assign, study_mutual])
+def test_experiments_on_all_distances_are_refused(pruned, study, silent_progress):
+    with Catalog.open(pruned) as some, pytest.raises(CatalogError, match="needs all pairs"):
+        study(some, "action", 1, 0, silent_progress)
 
 
 def test_a_clip_more_compares_it_alone_and_ends_like_a_fresh_run(library, tmp_path, silent_progress):

@@ -206,6 +206,7 @@ def _measured(run: _SampleRun, reports: Sequence[TaskReport], start: float, star
     ingested, features = run.joined("ingested", graph.ingested), run.joined("features", graph.ingested)
     pairs = run.joined("pairs", graph.compared)
     merged = store.rows([store.part_name("resampled", task.key) for task in graph.resampled])
+    compared = len(ingested) * (len(ingested) - 1) // 2  # of which far ones may have been left out
     members = store.load(graph.identified.key, "members")["cluster_id"].to_numpy()
     counts = np.unique(members, return_counts=True)[1]
     return Calibration(
@@ -215,10 +216,10 @@ def _measured(run: _SampleRun, reports: Sequence[TaskReport], start: float, star
         source_frames=int(ingested["frames"].to_numpy().sum()),
         frames=len(features),
         merged_frames=merged,
-        pairs=len(pairs),
+        pairs=compared,
         stages={stage: _share(stage, reports) for stage in graph.tasks_by_stage()},
-        tile=_tile(run, len(pairs), _share("compare", reports).disk),
-        squares=time_squares(store, ingested, pairs, features, graph.config.clusters),
+        tile=_tile(run, compared, _share("compare", reports).disk),
+        squares=time_squares(store, ingested, pairs, features, graph.config),
         concentration=float(((counts / len(members)) ** 2).sum()),
         starting=starting,
         seconds=time.perf_counter() - start,

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy.spatial.distance import squareform
 
 from motionary.catalog.store import Store
 from motionary.pipeline.alignment import similarity_index
-from motionary.pipeline.config import ClusterConfig
+from motionary.pipeline.config import PipelineConfig
 from motionary.pipeline.features import POSE_COLUMNS
 from motionary.pipeline.parts import Parts
 from motionary.pipeline.stages.cluster import cluster
+from motionary.pipeline.stages.cluster_pruned import cluster_pruned
 from motionary.pipeline.stages.clustered_pairs import ClusteredPairs
-from motionary.pipeline.stages.columns import condensed, condensed_places, matrix
+from motionary.pipeline.stages.columns import matrix, pair_places, places_by_clip
 from motionary.pipeline.tables import TABLES
 
 CLIPS = (400, 1200)
@@ -52,7 +52,7 @@ class Squares:
 
 
 def time_squares(
-    store: Store, ingested: pa.Table, pairs: pa.Table, features: pa.Table, config: ClusterConfig
+    store: Store, ingested: pa.Table, pairs: pa.Table, features: pa.Table, config: PipelineConfig
 ) -> Squares:
     """Time it on made-up clips.
 
@@ -61,17 +61,19 @@ def time_squares(
     store : Store
         Takes the made-up pairs.
     ingested, pairs, features : pyarrow.Table
-        Of the sample: at least two clips, all their pairs, and frames.
-    config : ClusterConfig
-        Linkage and cut; a number of clusters or a threshold is passed over.
+        Of the sample: at least two clips, their pairs, and frames. A pair that was left out is taken for
+        infinitely far.
+    config : PipelineConfig
+        Linkage and cut, and which pairs are left out.
     """
+    stage = cluster if config.most_distance is None else cluster_pruned
     nothing = pa.table({"clip_id": pa.array([], pa.string())}), TABLES["labels"].empty_table()
     clusterings = []
     for count in CLIPS:
         clips = _copies(ingested, count)
-        parts = _pairs_of_copies(store, ingested, pairs, count)
+        parts = _pairs_of_copies(store, ingested, pairs, count, config.most_distance)
         start = time.perf_counter()
-        cluster(clips, parts, *nothing, config)
+        stage(clips, parts, *nothing, config.clusters)
         clusterings.append((count, time.perf_counter() - start))
     return Squares(tuple(clusterings), _passing(clips, parts), _similarity(features))
 
@@ -85,9 +87,14 @@ def _names(count: int) -> list[str]:
     return [f"made-up/{number:06d}.bvh" for number in range(count)]
 
 
-def _pairs_of_copies(store: Store, ingested: pa.Table, pairs: pa.Table, count: int) -> Parts:
+def _pairs_of_copies(
+    store: Store, ingested: pa.Table, pairs: pa.Table, count: int, most: float | None
+) -> Parts:
     names, (i, j) = pa.array(_names(count)), np.triu_indices(count, 1)
     distances = _distances_of_copies(ingested, pairs, i, j)
+    if most is not None:
+        near = distances["weighted"] <= most
+        i, j, distances = i[near], j[near], {name: values[near] for name, values in distances.items()}
     keys = []
     for start in range(0, len(i), _PART):
         part = slice(start, start + _PART)
@@ -102,12 +109,15 @@ def _pairs_of_copies(store: Store, ingested: pa.Table, pairs: pa.Table, count: i
 
 def _distances_of_copies(ingested: pa.Table, pairs: pa.Table, i: NDArray, j: NDArray) -> dict[str, NDArray]:
     apart = np.random.default_rng(0).random(len(i)) * _APART
-    places = condensed_places(pairs, ingested["clip_id"])
+    a, b = pair_places(pairs, places_by_clip(ingested["clip_id"]))
     i, j = i % len(ingested), j % len(ingested)
     distances = {}
     for name in ("dtw", "b_dtw", "weighted", "fuzzy_low", "fuzzy_high"):
-        square = squareform(condensed(pairs, name, places))
-        distances[name] = (square[i, j] + apart * square.mean()).astype(np.float32)
+        square = np.full((len(ingested), len(ingested)), np.inf)
+        np.fill_diagonal(square, 0.0)
+        square[a, b] = square[b, a] = pairs[name].to_numpy()
+        mean = square[np.isfinite(square)].mean()
+        distances[name] = (square[i, j] + apart * mean).astype(np.float32)
     return distances
 
 

@@ -22,6 +22,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from motionary.catalog import Catalog
+from motionary.catalog.own_pairs import refuse_without_all_pairs
 from motionary.pipeline.tables import table_field
 from motionary.workflows.errors import UserError
 from motionary.workflows.reproduce.assign_trial import (
@@ -106,9 +107,12 @@ def study_assign(
 
     Raises
     ------
+    CatalogError
+        The run compared some pairs alone.
     UserError
         The catalog has no such labels, or too few.
     """
+    refuse_without_all_pairs(catalog, "an experiment on naming")
     sets = _sets(catalog, label_column, seed)
     rows: list[dict] = []
     with show({"assign": len(sets)}) as advance:

@@ -25,6 +25,7 @@ from scipy.stats import norm, rankdata
 
 from motionary.catalog import Catalog
 from motionary.catalog.mutual import UsualDistances, mutual_proximity
+from motionary.catalog.own_pairs import refuse_without_all_pairs
 from motionary.pipeline.retrieval import mean_average_precision, nearest_neighbour_accuracy
 from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.pipeline.tables import table_field
@@ -72,9 +73,12 @@ def study_mutual(catalog: Catalog, label_column: str, draws: int, seed: int, sho
 
     Raises
     ------
+    CatalogError
+        The run compared some pairs alone.
     UserError
         The catalog has no such labels, or fewer than two that two clips have.
     """
+    refuse_without_all_pairs(catalog, "an experiment on ranking")
     clips = labelled_clips(catalog, label_column)
     pairs, clip_ids = catalog.pairs.to_arrow(), catalog.clips.to_arrow()["clip_id"]
     places = condensed_places(pairs, clip_ids)
