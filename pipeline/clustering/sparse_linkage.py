@@ -97,7 +97,7 @@ def _rows(
     columns, values : array (2 pairs,)
         Who is known, and how far away.
     """
-    from motionary.pipeline.clustering.sparse_linkage_kernels import fill_rows, sort_rows
+    from motionary.pipeline.clustering.sparse_linkage_kernels import fill_rows
 
     counts, dtype = np.zeros(clips, np.int64), np.dtype(np.float32)
     for first, second, distances in read():
@@ -108,9 +108,13 @@ def _rows(
     ends = starts.copy()
     for first, second, distances in read():
         fill_rows(ends, columns, values, first, second, distances)
-    row, column = sort_rows(starts, counts, columns, values)
-    if row >= 0:
-        raise ValueError(f"the pair of clips {row} and {column} is given again; give each once")
+    for row, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        order = np.argsort(columns[start:end])
+        columns[start:end], values[start:end] = columns[start:end][order], values[start:end][order]
+        again = np.flatnonzero(np.diff(columns[start:end]) == 0)
+        if len(again):
+            column = columns[start + again[0]]
+            raise ValueError(f"the pair of clips {row} and {column} is given again; give each once")
     return starts, counts, columns, values
 
 

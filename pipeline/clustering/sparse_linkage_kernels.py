@@ -17,19 +17,6 @@ def fill_rows(ends, columns, values, first, second, distances):  # type: ignore[
 
 
 @njit(nogil=True, cache=True)
-def sort_rows(starts, counts, columns, values):  # type: ignore[no-untyped-def]
-    """Sort every row by its columns. Returns a row and a column that it holds twice, or -1 and -1."""
-    for row in range(len(starts)):
-        here = slice(starts[row], starts[row] + counts[row])
-        order = np.argsort(columns[here])
-        columns[here], values[here] = columns[here][order], values[here][order]
-        for place in range(starts[row] + 1, starts[row] + counts[row]):
-            if columns[place] == columns[place - 1]:
-                return row, np.int64(columns[place])
-    return -1, np.int64(-1)
-
-
-@njit(nogil=True, cache=True)
 def sparse_chain(starts, counts, columns, values):  # type: ignore[no-untyped-def]
     """Merge until no two clusters that are left know each other; the rows are used up.
 

@@ -30,7 +30,7 @@ from tests.benchmarks.tables import WIDTH
 
 CLIPS, KINDS = 20_000, 200
 MU = 1.0  # about the width of a kind
-ROWS = 500  # of the square, a part
+ROWS = 50  # of the square, a part: a million pairs of 20,000 clips, as a tile has
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
