@@ -50,11 +50,11 @@ bench-alignment: $(VENV)/installed
 	$(BIN)/python -m tests.benchmarks.alignment --json motionary-bench/alignment.json
 
 bench-ask: $(VENV)/installed
-	@echo "== Questions to catalogs of 300 to 10,000 embedded clips; making them takes half an hour, the first time"
+	@echo "== Questions to catalogs of 300 to 10,000 embedded clips; making them takes a quarter of an hour, the first time"
 	$(BIN)/python -m tests.benchmarks.ask --json motionary-bench/ask.json
 
 scale: $(VENV)/installed
-	@echo "== Libraries of 300, 1,000, 3,000 and 10,000 embedded clips, run and measured: an hour or more"
+	@echo "== Libraries of 300, 1,000, 3,000 and 10,000 embedded clips, run and measured: half an hour"
 	$(BIN)/python -m tests.benchmarks.scale --json motionary-bench/scale.json
 
 torture: $(VENV)/installed

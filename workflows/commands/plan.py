@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from motionary.workflows.commands.job_options import job_of
 from motionary.workflows.commands.options import COMPILING, stderr_console
-from motionary.workflows.commands.run import job_of, run
+from motionary.workflows.commands.run import run
 
 if TYPE_CHECKING:
     from motionary.workflows.costs.foretold import Foretold

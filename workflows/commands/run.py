@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from motionary.workflows.commands.job_options import job_of, worker_count
 from motionary.workflows.commands.options import (
     COMPILING,
     QUARANTINED,
@@ -141,60 +142,6 @@ def run(
         print(prepare(job).plan)
 
 
-def job_of(
-    *,
-    library: Path,
-    catalog: str,
-    also: list[Path] | None,
-    labels: Path | None,
-    label_pattern: str | None,
-    label_column: str | None,
-    paper: bool,
-    primary: str | None,
-    metric: str | None,
-    clusters: int | None,
-    threshold: float | None,
-    prune: bool,
-    landmarks: str | None,
-    weights: str | None,
-    full_grid: bool,
-    travel: bool,
-    config: Path | None,
-    workers: int | None,
-    memory: int | None,
-    scheduler: str | None,
-) -> Job:
-    """Make a job of the options of `run`."""
-    from motionary.workflows.preparation import Job
-    from motionary.workflows.settings import PAPER, load_settings
-
-    if clusters is not None and threshold is not None:
-        raise typer.BadParameter("give --clusters or --threshold, not both")
-    options: dict[str, dict[str, Any]] = {"clusters": {}, "features": {}}
-    if paper:
-        options = {stage: dict(fields) for stage, fields in PAPER.items()}
-    given = {
-        "primary": primary, "metric": metric, "n_clusters": clusters, "threshold": threshold,
-        "label_column": label_column,
-    }  # fmt: skip
-    options["clusters"] |= {name: value for name, value in given.items() if value is not None}
-    if not travel:
-        options["features"]["travel_time"] = 0.0
-    if prune and landmarks is not None:
-        raise typer.BadParameter("give --prune or --landmarks, not both")
-    if prune:
-        options["distances"] = {"pairs": "pruned"}
-    if landmarks is not None:
-        options["distances"] = {"pairs": "landmarks"}
-        options["clusters"]["landmarks"] = _landmarks(landmarks)
-    options["alignment"] = ({"weights": weights} if weights else {}) | (
-        {"search": "full"} if full_grid else {}
-    )
-    libraries = [str(one) for one in (library, *(also or []))]
-    settings = load_settings(config, options)
-    return Job(libraries, catalog, settings, labels, _count(workers), scheduler, label_pattern, memory)
-
-
 def demo(
     folder: Annotated[Path, typer.Argument(help="Where the library and the catalog go.")] = Path(
         "motionary-demo"
@@ -221,14 +168,14 @@ def demo(
     log.print(f"Writing the embedded library to {library}", highlight=False, soft_wrap=True)
     try:
         with progress({"write": clips}, log) as done:
-            count, written = _count(workers), partial(done, "write")
+            count, written = worker_count(workers), partial(done, "write")
             write_library(library, seed, clips, processes=count, written=written)
     except ValueError as error:
         raise UserError(str(error)) from error
     log.print(f"$ motionary run {library} {catalog} --labels {library / 'labels.csv'}", soft_wrap=True)
     labels = library / "labels.csv"
     settings = load_settings(None, {})
-    job = Job([str(library)], str(catalog), settings, labels, workers=_count(workers), memory=memory)
+    job = Job([str(library)], str(catalog), settings, labels, workers=worker_count(workers), memory=memory)
     _run(job, as_json)
     if as_json:
         return
@@ -283,20 +230,6 @@ def _run(job: Job, as_json: bool) -> None:
         print_summary(result.catalog, output_console())
     if len(result.catalog.quarantine):
         raise typer.Exit(QUARANTINED)
-
-
-def _landmarks(given: str) -> int | None:
-    if given == "auto":
-        return None
-    if not given.isdecimal() or not int(given):
-        raise typer.BadParameter(f"--landmarks is {given!r}; give a number from 1, or auto")
-    return int(given)
-
-
-def _count(workers: int | None) -> int:
-    from dask.system import CPU_COUNT
-
-    return workers or CPU_COUNT
 
 
 def _explain(result: RunResult, job: Job, log: Console) -> None:
