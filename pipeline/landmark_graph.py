@@ -7,7 +7,9 @@
 The rest is as in `motionary.pipeline.graph`. The three lines are built one after the other: who is nearest to
 which landmarks is known when they are chosen, and what there is to refine when all clips are assigned. An
 assignment is named by the contents of its batch and of the landmarks that stand for groups, a refinement by
-those of its groups and the threshold; so what stays the same from run to run is not computed again.
+those of its groups and by the threshold on all clips; so what stays the same from run to run is not computed
+again. By Ward linkage, unless it is told, that threshold moves with the number of clips: then all is refined
+anew.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from motionary.pipeline.stages import (
     sample,
     stand,
 )
+from motionary.pipeline.stages.cluster import TooFewClipsError
 from motionary.pipeline.task import MAKES, OF_LANDMARKS, Task
 
 
@@ -45,7 +48,14 @@ class LandmarkGraph(LibraryGraph):
         """The clips all pairs of which are compared, in clip_id order; some may prove not to be readable."""
         clips = sorted(self.layout, key=lambda clip: clip.clip_id)
         count = self.config.clusters.landmarks or landmark_count(len(clips))
-        return [clips[place] for place in sample_clips([clip.key for clip in clips], count)]
+        return [
+            clips[place] for place in sample_clips([self.contents[clip.clip_id] for clip in clips], count)
+        ]
+
+    @cached_property
+    def contents(self) -> dict[str, str]:
+        """What every clip is drawn by: its bytes, which stay what they are when it is read again."""
+        return {clip.clip_id: clip.source.digest or clip.clip_id for clip in self.layout}
 
     @cached_property
     def compared_sides(self) -> list[list[Clip]]:
@@ -123,6 +133,8 @@ class LandmarkGraph(LibraryGraph):
         """List the tasks that lead to the clusters: of the landmarks, of all clips, of all groups."""
         yield self.comparison()
         groups = load(self.clustered.key, "groups")
+        if not len(groups):
+            self._refuse_without_landmarks(load)
         assigned = self._assigned(groups, load(self.standing.key, "standing", ["group", "clip_id"]))
         yield assigned
         group_of: dict[str, int] = {}
@@ -164,6 +176,14 @@ class LandmarkGraph(LibraryGraph):
             arguments=(kept, self.config.distances, *others),
         )  # fmt: skip
 
+    def _refuse_without_landmarks(self, load: Load) -> None:
+        readable = sum(len(load(task.key, "ingested", ["clip_id"])) for task in self.ingested)
+        if readable:
+            raise TooFewClipsError(
+                f"of {len(self.landmarks)} landmarks none can be read, and of the other clips {readable}; "
+                "take more landmarks"
+            )
+
     @property
     def _refinements(self) -> int:
         """How many tasks refine: each has groups of together about as many clips as there are landmarks."""
@@ -200,7 +220,7 @@ class LandmarkGraph(LibraryGraph):
     def _refined(self, group_of: dict[str, int], mu: float, most: int) -> list[Task]:
         members: list[list[tuple[str, str]]] = [[] for _ in range(max(group_of.values(), default=-1) + 1)]
         for clip_id in sorted(group_of):
-            members[group_of[clip_id]].append((clip_id, self.layout.keys[clip_id]))
+            members[group_of[clip_id]].append((clip_id, self.contents[clip_id]))
         made = []
         for number in range(self._refinements):
             some = members[number :: self._refinements]
@@ -210,9 +230,10 @@ class LandmarkGraph(LibraryGraph):
                 for one, batch in enumerate(self.layout.batches)
                 if any(clip.clip_id in parted for clip in batch)
             }
+            keys = [self.layout.keys[clip_id] for group in some for clip_id, _ in group]
             made.append(
                 Task(
-                    "refine", self._key("refine", (some, mu, most)), refine.refine, reads=(),
+                    "refine", self._key("refine", (some, keys, mu, most)), refine.refine, reads=(),
                     streams=[("resampled", self._resampled(batches))],
                     arguments=(some, self.config.clusters, self.config.distances, mu, most),
                 )

@@ -246,16 +246,18 @@ def digest_of_settings(*settings: Any) -> str:
 
 
 def cut_by_name(clip_ids: Sequence[str], size: int) -> list[list[str]]:
-    """Cut clips into runs of about `size`, twice that at most.
+    """Cut clips into runs of about `size`, half as many more at most.
 
-    A run ends after a clip whose name says so, by its digest. So a clip that comes or goes after a job that
-    was killed changes its own run, not all that follow, and the results of the others are found again.
+    From half the size on, a run ends after a clip whose name says so, by its digest. So a clip that comes or
+    goes after a job that was killed changes its own run and maybe the next ones, not all that follow, and the
+    results of the others are found again.
     """
     runs: list[list[str]] = [[]]
     for clip_id in clip_ids:
         runs[-1].append(clip_id)
         drawn = int.from_bytes(hashlib.blake2b(clip_id.encode(), digest_size=8).digest())
-        if drawn % size == 0 or len(runs[-1]) == 2 * size:
+        length, half = len(runs[-1]), (size + 1) // 2
+        if length >= size + size // 2 or (length >= half and drawn % max(half, 2) == 0):
             runs.append([])
     return [run for run in runs if run]
 

@@ -397,3 +397,12 @@ def test_a_stages_bar_says_what_is_left_while_that_is_known():
         for finished, seconds in ((False, None), (False, 75.4), (True, 0.0))
     ]
     assert shown == ["", "0:01:15 left", ""]
+
+
+def test_a_killed_task_of_the_whole_library_names_every_clip_once(demo_library, tmp_path):
+    config = PipelineConfig(distances=DistanceConfig(tile=8))
+    graph = prepare(Job([str(demo_library)], str(tmp_path / "none"), config)).graph
+    killed = SimpleNamespace(task=f"cluster-{graph.clustered.key}-run", allowed_failures=3)
+    told = crew._of_killed(killed, graph.comparison())
+    assert "stage cluster (clips jump/jump_energetic" in told
+    assert ", 80 of them) was the end of 4 workers" in told

@@ -2,6 +2,7 @@
 
 import time
 
+import numpy as np
 import pyarrow as pa
 import pytest
 
@@ -75,8 +76,15 @@ def test_batches_hold_every_clip_once_in_order(size):
     clip_ids = [source.clip_id for source in sources]
     batches = cut_by_name(clip_ids, size)
     assert [clip for batch in batches for clip in batch] == clip_ids
-    assert max(map(len, batches)) <= 2 * size
+    assert max(map(len, batches)) <= size + size // 2
     assert all(batches)
+
+
+@pytest.mark.parametrize("size", [32, 512, 1024])
+def test_batches_are_about_as_large_as_was_asked_for(size):
+    batches = cut_by_name([f"{number:06}.bvh" for number in range(40 * size)], size)
+    assert 0.8 * size < np.mean([len(batch) for batch in batches]) < 1.1 * size
+    assert min(map(len, batches[:-1])) >= size // 2
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def reference(graph, store: Store, labels: list | None) -> list[int]:
     found = pairwise_distances([frames[one] for one in clip_ids], n_jobs=1)
     clusters = graph.config.clusters
     square = np.stack([squareform(getattr(found, name)) for name in channels_of(clusters)])
-    keys = [graph.layout.keys[one] for one in clip_ids]
+    keys = [graph.contents[one] for one in clip_ids]
     exact = cluster_by_landmarks(
         keys, lambda a, b: square[:, a[:, None], b], clusters, labels, clusters.landmarks
     )
@@ -114,6 +114,13 @@ def test_groups_are_those_of_the_pure_functions(library, stored, landmarks, clus
     assert groups["group"].to_pylist() == reference(graph, Store(stored), labels)
     assert groups["clip_id"].to_pylist() == sorted(graph.layout.keys)
     assert sum(groups["landmark"].to_pylist()) == landmarks
+
+
+def test_another_threshold_refines_anew(library, stored):
+    for threshold in (0.4, 0.3, 0.4):
+        job = Job(library, stored, config_of(6, threshold=threshold))
+        graph, groups = grouped(job)
+        assert groups["group"].to_pylist() == reference(graph, Store(stored), None)
 
 
 def test_refinement_finds_what_landmarks_missed(library, stored):
@@ -148,10 +155,11 @@ def test_it_verifies_and_says_that_it_is_approximate(made, motionary):
         own = sum(size * (size - 1) // 2 for size in _sizes_before_refining(catalog))
         stand = catalog.store.read(catalog.files("standing"))["clip_id"].unique()
         assert found.compared == 15 * 14 // 2 + 15 * len(stand) + own
+        assert catalog.runs.to_arrow()["pairs_computed"][-1].as_py() == found.compared
         for page in (overview_page(catalog), report_page(catalog)):
             assert str(found) in page
             assert "motionary reproduce landmarks" in page
-            assert "those of its landmarks" in page or page == overview_page(catalog)
+        assert "those of its landmarks" in report_page(catalog)
         clip_id = catalog.clips.to_arrow()["clip_id"][5].as_py()
         assert not catalog.similar(clip_id, 4).from_pairs
         with pytest.raises(CatalogError, match="mutual proximity needs all pairs"):
@@ -240,6 +248,45 @@ def test_a_landmark_that_cannot_be_read_drops_out(demo_library, tmp_path, silent
     assert [check for check in verify(job.catalog) if not check.passed] == []
 
 
+@pytest.mark.parametrize(
+    ("landmarks", "clusters", "said"),
+    [
+        (2, {}, "of 2 landmarks none can be read, and of the other clips 2; take more landmarks"),
+        (3, {"n_clusters": 2}, "2 clusters are asked for, and of the clips to cluster 1 can be read"),
+    ],
+)
+def test_too_few_landmarks_that_can_be_read_are_told(
+    demo_library, tmp_path, silent_progress, landmarks, clusters, said
+):
+    folder = tmp_path / "library"
+    folder.mkdir()
+    for file in sorted((demo_library / "walk").iterdir())[2:4]:
+        shutil.copy(file, folder)
+    job = Job([str(folder)], str(tmp_path / "out"), config_of(landmarks, **clusters))
+    broken = {"x.bvh", "y.bvh"}
+    for number in range(100):
+        for name in broken:
+            (folder / name).write_text(f"HIERARCHY {number} {name}")
+        if broken <= {clip.clip_id for clip in prepare(job).graph.landmarks}:
+            break
+    with pytest.raises(UserError, match=said):
+        run(job, silent_progress)
+    assert not (tmp_path / "out" / "CURRENT").exists()
+
+
+def test_clips_that_are_read_again_leave_the_landmarks_as_they_were(demo_library, tmp_path, silent_progress):
+    folder = tmp_path / "library"
+    shutil.copytree(demo_library / "walk", folder)
+    for number in range(6):
+        (folder / f"gone-{number}.bvh").symlink_to(tmp_path / f"nothing-{number}")
+    job = Job([str(folder)], str(tmp_path / "out"), config_of(8, n_clusters=2))
+    found = []
+    for _ in range(4):
+        catalog = run(job, silent_progress).catalog
+        found.append((approximation(catalog).landmarks, catalog.clusters.to_arrow().to_pylist()))
+    assert found == [found[0]] * 4
+
+
 def test_nothing_that_can_be_read_is_a_catalog_too(tmp_path, silent_progress):
     folder = tmp_path / "library"
     folder.mkdir()
@@ -258,7 +305,7 @@ def test_as_many_landmarks_as_clips_are_all_pairs(library, tmp_path, silent_prog
     assert graph.config == ALL
     if landmarks:
         run(replace(job, libraries=library[:1]), silent_progress, remark=said.append)
-        assert said == ["compares all pairs: landmarks are for more than 10 clips"]
+        assert said == ["compares all pairs: of 10 clips, landmarks would be all"]
 
 
 def test_more_clusters_than_landmarks_are_refused(library, tmp_path):

@@ -248,7 +248,7 @@ def test_two_nights(library, motionary, tmp_path):
 def test_what_a_run_remarks_is_logged(library, motionary, tmp_path):
     file = configuration(tmp_path, '[distances]\npairs = "landmarks"')
     assert motionary("nightly", file)[0] == 0
-    assert "compares all pairs: landmarks are for more than 8 clips" in [
+    assert "compares all pairs: of 8 clips, landmarks would be all" in [
         line["text"] for line in logged(tmp_path, "remark")
     ]
 

@@ -16,14 +16,14 @@ from motionary.pipeline.readers.library import FileState, Source
 from motionary.pipeline.task import MAKES, OF_LANDMARKS
 from motionary.workflows.costs.amounts import Amounts, clip_sizes
 from motionary.workflows.costs.calibration import Calibration, Share, Tile, calibrate
-from motionary.workflows.costs.disk import refuse_small_disks
+from motionary.workflows.costs.disk import needed_bytes, refuse_small_disks
 from motionary.workflows.costs.made_up import Squares
 from motionary.workflows.costs.memory import need_of, refuse
 from motionary.workflows.costs.model import foretold_by, with_seconds
 from motionary.workflows.costs.sample import sample_size, sampled
 from motionary.workflows.costs.sizes import parse_size, size_text, time_text
 from motionary.workflows.errors import UserError
-from motionary.workflows.main_job import run
+from motionary.workflows.main_job import _processes, run
 from motionary.workflows.nightly_settings import load_nightly
 from motionary.workflows.preparation import Job, prepare
 from motionary.workflows.settings import SettingsError
@@ -40,7 +40,9 @@ def test_sizes_are_read(text, size):
     assert parse_size(text) == size
 
 
-@pytest.mark.parametrize("text", ["", "GB", "0", "0GB", "-4GB", "4 apples", "nan", "inf", "1e9", "4GB4"])
+@pytest.mark.parametrize(
+    "text", ["", "GB", "0", "0GB", "-4GB", "4 apples", "nan", "inf", "1e9", "4GB4", "9" * 400 + "GB"]
+)
 def test_what_is_no_size_is_refused_with_a_mend(text):
     with pytest.raises(ValueError, match="4GB or 512MiB"):
         parse_size(text)
@@ -58,9 +60,14 @@ def test_sizes_and_times_are_written_shortly():
 
 
 def amounts(clips: int, a_clip: int = 80_000) -> Amounts:
-    side = min(clips, 1 << max(5, int(np.log2(3 * clips**0.5))))
+    side = min(clips, 1 << max(5, int(np.log2(6 * clips**0.5))))
     return Amounts(
-        clips, batch=min(clips, 64) * a_clip, file=a_clip, tile=side * side, library=clips * a_clip
+        clips,
+        batch=min(clips, 64) * a_clip,
+        file=a_clip,
+        largest="a.bvh",
+        tile=side * side,
+        library=clips * a_clip,
     )
 
 
@@ -131,7 +138,7 @@ def test_a_run_for_which_a_disk_is_too_small_writes_nothing(
 @pytest.mark.parametrize("full", ["catalog", "temporary"])
 def test_a_disk_too_small_for_all_pairs_has_fewer_proposed(full, demo_library, tmp_path, monkeypatch):
     ready = prepare(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig()))
-    many = replace(ready.plan, to_compare=10_000 * 9_999 // 2)
+    many = replace(ready.plan, to_store=10_000 * 9_999 // 2)
     need = need_of(amounts(10_000), 2, 64 * GIB)
     usage = namedtuple("usage", "free")
     monkeypatch.setattr(
@@ -179,7 +186,7 @@ MEASURED = Calibration(
     stages={stage: Share(1.0, 10_000) for stage in STAGES},
     tile=Tile(alone=5e-3, batch=2e-3, pair=2e-5, disk=3000, pair_disk=40),
     squares=Squares(((400, 0.2), (1200, 1.0)), passing=1e-7, similarity=2e-8),
-    concentration=0.2, starting=5.0, seconds=10.0,
+    clusters=8, concentration=0.2, starting=5.0, seconds=10.0,
 )  # fmt: skip
 
 
@@ -215,8 +222,54 @@ def test_landmarks_are_foretold_to_take_less(demo_library, tmp_path):
     one, other = (foretold_by(prepare(job), MEASURED) for job in (whole, replace(whole, config=config)))
     assert [stage.stage for stage in other.stages] == [*MAKES]
     assert other.plan.to_compare == 20 * 19 // 2 + 80 * 20 // 2
-    assert other.seconds < one.seconds
+    assert (other.plan.to_store, one.plan.to_store) == (20 * 19 // 2, 80 * 79 // 2)
+    seconds, disk, memory = (
+        {stage.stage: getattr(stage, what) for stage in other.stages}
+        for what in ("seconds", "disk", "memory")
+    )
+    assert seconds["refine"] >= MEASURED.tile.pair * 800
+    assert seconds["assign"] / seconds["refine"] == pytest.approx(80 * 4 * 8 / 800)
+    assert disk["compare"] == pytest.approx(190 * MEASURED.tile.pair_disk + MEASURED.tile.disk)
+    assert min(memory.values()) > 0
     assert other.disk < one.disk
+
+
+def test_what_landmarks_take_of_memory_and_disk_goes_with_the_landmarks(demo_library, tmp_path):
+    few, many = (
+        prepare(
+            Job(
+                [str(demo_library)],
+                str(tmp_path / "out"),
+                PipelineConfig(
+                    clusters=ClusterConfig(landmarks=count), distances=DistanceConfig(pairs="landmarks")
+                ),
+            )
+        )
+        for count in (10, 70)
+    )
+    assert few.amounts.tile == 10 * 10 < many.amounts.tile
+    assert needed_bytes(few.amounts, few.plan) < needed_bytes(many.amounts, many.plan)
+    large = replace(amounts(100_000), landmarks=6_000, tile=512 * 512)
+    need = need_of(large, 2, 64 * GIB)
+    assert need.stages["stand"] > 8 * 6_000**2
+    assert need.stages["refine"] > 8 * 6_000**2
+    assert need.stages["compare"] < need_of(amounts(100_000), 2, 64 * GIB).stages["compare"]
+
+
+def test_a_file_that_is_too_large_is_named():
+    large = replace(amounts(100), file=30 * 10**9, largest="takes/huge.bvh")
+    with pytest.raises(UserError, match=r"ingest of takes/huge.bvh 4.. GB; take that file out or allow more"):
+        refuse(need_of(large, 1, 25 * 10**9))
+
+
+def test_few_workers_work_alone_where_they_would_be_done_before_others_are_up(ready):
+    def processes(workers: int, seconds: float | None) -> int:
+        job = replace(ready, job=replace(ready.job, workers=workers))
+        return _processes(replace(job, plan=replace(ready.plan, seconds=seconds)))
+
+    assert (processes(2, 3.0), processes(2, 5.0)) == (1, 2)
+    assert (processes(64, 0.05), processes(64, 3.9)) == (1, 64)
+    assert (processes(1, 100.0), processes(4, None)) == (1, 4)
 
 
 def test_what_near_pairs_take_is_not_known_before(demo_library, tmp_path):
@@ -260,6 +313,18 @@ def test_the_calibration_runs_every_stage_and_leaves_nothing(ready, tmp_path, mo
     told = foretold_by(ready, measured)
     frames = 5364  # of all 80 clips at the common rate
     assert told.frames == pytest.approx(frames, rel=0.2)
+
+
+@pytest.mark.parametrize(("clips", "broken"), [(1, 0), (0, 3)])
+def test_of_too_few_clips_there_is_no_plan(demo_library, tmp_path, clips, broken):
+    for number, file in enumerate(sorted(demo_library.rglob("*.bvh"))[:clips]):
+        (tmp_path / f"{number}.bvh").write_bytes(file.read_bytes())
+    for number in range(broken):
+        (tmp_path / f"broken-{number}.bvh").write_text(f"HIERARCHY {number}")
+    graph = prepare(Job([str(tmp_path)], str(tmp_path / "out"), PipelineConfig())).graph
+    said = f"of {clips + broken} clips that were tried, {clips} can be read, and a plan takes two"
+    with pytest.raises(UserError, match=said):
+        calibrate(graph)
 
 
 @pytest.mark.parametrize("mu", [1e-9, 0.15])

@@ -140,4 +140,4 @@ def _disk_fault(error: OSError) -> str:
     if error.strerror is None or mend is None:
         return str(error)
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror.lower()}; {mend}"
+    return f"{where}{error.strerror[:1].lower()}{error.strerror[1:]}; {mend}"

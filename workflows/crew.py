@@ -135,6 +135,12 @@ def _of_killed(error: KilledWorker, tasks: Sequence[Task]) -> str:
 
 def _clips(task: Task, by_key: Mapping[str, Task]) -> list[str]:
     """Name the clips that a task is about, as far as this run reads them."""
-    if task.stage == "ingest":
-        return [source.clip_id for _, source in task.arguments[0]]
-    return [one for key in task.after if key in by_key for one in _clips(by_key[key], by_key)]
+    waiting, seen, clips = [task], {task.key}, []
+    while waiting:
+        one = waiting.pop()
+        if one.stage == "ingest":
+            clips += [source.clip_id for _, source in one.arguments[0]]
+        new = {key for key in one.after if key in by_key} - seen
+        seen |= new
+        waiting += [by_key[key] for key in new]
+    return sorted(clips)

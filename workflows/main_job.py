@@ -13,11 +13,12 @@ from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import CURRENT, current_snapshot
 from motionary.catalog.store import Store
 from motionary.catalog.writer_lock import Writer, the_only_writer
+from motionary.pipeline.stages.cluster import TooFewClipsError
 from motionary.pipeline.task import TaskReport
 from motionary.workflows.computation import Computation, StoredParts
 from motionary.workflows.costs.disk import refuse_small_disks
 from motionary.workflows.costs.memory import refuse
-from motionary.workflows.costs.model import with_seconds
+from motionary.workflows.costs.model import SECONDS_TO_START, with_seconds
 from motionary.workflows.crew import Remark
 from motionary.workflows.errors import UserError
 from motionary.workflows.plan import Plan
@@ -25,9 +26,6 @@ from motionary.workflows.preparation import Job, Prepared, prepare
 from motionary.workflows.publication import Check, publish_run
 from motionary.workflows.scheduler import Workers
 from motionary.workflows.workplace import Workplace
-
-_SECONDS_TO_START = 4.0
-"""Seconds that a worker process takes until it works: it imports what this one has imported."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +92,9 @@ def run(
     CatalogError
         Another process writes this catalog.
     UserError
-        The library is missing or holds no clip or too few, the labels file cannot be used, the catalog's
-        folder holds something else, the run needs more memory or disk than there is, the scheduler cannot be
-        reached or its workers lack something, or compiled kernels cannot be kept.
+        The library is missing or holds no clip or too few that can be read, the labels file cannot be used,
+        the catalog's folder holds something else, the run needs more memory or disk than there is, the
+        scheduler cannot be reached or its workers lack something, or compiled kernels cannot be kept.
     """
     started = datetime.now(UTC)
     ready = prepare(job)
@@ -106,7 +104,7 @@ def run(
         if current_snapshot(ready.store) != ready.before:  # somebody published while this run was preparing
             ready = prepare(job)
         if ready.job.config.distances.pairs != job.config.distances.pairs:
-            remark(f"compares all pairs: landmarks are for more than {len(ready.graph.layout.keys)} clips")
+            remark(f"compares all pairs: of {len(ready.graph.layout.keys)} clips, landmarks would be all")
         ready = with_seconds(ready, compiling, remark)
         planned(ready.plan)
         with (
@@ -115,7 +113,10 @@ def run(
         ):
             # Listed anew under the lock: a vacuum may have come between.
             stored = StoredParts(ready.store, ready.before)
-            made = _compute(ready, Computation(ready.store, stored, workers, done))
+            try:
+                made = _compute(ready, Computation(ready.store, stored, workers, done))
+            except TooFewClipsError as error:
+                raise UserError(str(error)) from None
         catalog = publish_run(ready, made, started, check)
     computed = sum(report.computed for report in made)
     return RunResult(
@@ -148,10 +149,9 @@ def _claim(store: Store) -> None:
 
 
 def _processes(ready: Prepared) -> int:
-    """Return how many processes to start: none beside this one for what is done before they are up."""
-    workers = ready.job.workers
-    work = None if ready.plan.seconds is None else ready.plan.seconds * workers
-    return 1 if work is not None and work < _SECONDS_TO_START * workers else workers
+    """Return how many processes to start: none beside this one for what it does sooner alone."""
+    workers, seconds = ready.job.workers, ready.plan.seconds
+    return 1 if seconds is not None and seconds * workers < SECONDS_TO_START + seconds else workers
 
 
 def _workplace(ready: Prepared) -> Workplace | None:

@@ -25,8 +25,8 @@ class Plan:
         bytes under another name, of names that are gone, and the others.
     to_read : int
         Different contents that have to be read.
-    to_compare : int
-        Pairs that have to be computed.
+    to_compare, to_store : int
+        Pairs that have to be computed, and those of them that are kept: by landmarks not all are.
     seconds : float, optional
         About how long that takes, judging by the catalog's last run that computed; None before there is one.
     memory : int
@@ -42,6 +42,7 @@ class Plan:
     unchanged: int
     to_read: int
     to_compare: int
+    to_store: int
     seconds: float | None
     memory: int
     memory_allowed: int | None
@@ -79,14 +80,15 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
     names = graph.names
     renamed = sum(one not in earlier for one in names)
     changed = sum(one in earlier and earlier[one] != digest for one, digest in digests.items())
-    to_read, to_compare = _contents_to_read(graph), _pairs_to_compare(graph)
+    to_read, to_store = _contents_to_read(graph), _pairs_to_store(graph)
+    to_compare = to_store + graph.later_pairs()
     new = len(digests) - len(names)
     removed = len(earlier) - len(names)
     touched = new + changed + removed
     return Plan(
         new=new, changed=changed, renamed=renamed, removed=removed,
         unchanged=len(names) - renamed - changed,
-        to_read=to_read, to_compare=to_compare,
+        to_read=to_read, to_compare=to_compare, to_store=to_store,
         seconds=_seconds(store, before, touched, to_read, to_compare, workers),
         memory=need.bytes, memory_allowed=need.allowed,
     )  # fmt: skip
@@ -104,10 +106,10 @@ def _contents_to_read(graph: LibraryGraph) -> int:
     return sum(map(len, missing))
 
 
-def _pairs_to_compare(graph: LibraryGraph) -> int:
-    """Count the pairs that no stored result holds, were every clip to be read."""
+def _pairs_to_store(graph: LibraryGraph) -> int:
+    """Count the pairs of tiles that no stored result holds, were every clip to be read."""
     tiles = combinations_with_replacement(graph.compared_sides, 2)
-    count = graph.later_pairs()
+    count = 0
     for task, (first, second) in zip(graph.compared, tiles, strict=True):
         if not graph.is_stored(task.key, task.makes):
             pairs = len(first) * (len(first) - 1) // 2 if first is second else len(first) * len(second)
@@ -133,12 +135,11 @@ def _seconds(
     if not measured:
         return None
     last, work = measured[-1], dict(measured[-1]["stage_seconds"])
+    compared = sum(work.get(stage, 0.0) for stage in ("compare", "assign", "refine"))
     clusters = max(last["clusters"], 1)
     # A clip that comes or goes has the others of its cluster aligned anew, as far as their reference changes.
     affected = min(touched * last["clips"] / clusters, last["clips"]) / max(last["clips"], 1)
-    total = (
-        work["ingest"] * to_read / last["clips_read"] + work["compare"] * to_compare / last["pairs_computed"]
-    )
+    total = work["ingest"] * to_read / last["clips_read"] + compared * to_compare / last["pairs_computed"]
     if touched or to_compare:
         total += work["cluster"] + (work["represent"] + work["align"] + work["style"]) * affected
     return total / workers

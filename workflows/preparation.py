@@ -122,12 +122,12 @@ def prepare(job: Job) -> Prepared:
     inputs = inputs_table(layout)
     labels = following(said or SCHEMAS["labels"].empty_table(), inputs)
     overrides = labels.filter(pc.is_in(labels["clip_id"], pa.array([*layout.keys], pa.string())))
-    compared = job.config.distances.pairs
-    amounts = Amounts.of(layout, job.config.clusters.landmarks, pruned=compared == "pruned")
-    need = need_of(amounts, job.workers, job.memory, job.scheduler)
     stored = StoredParts(store, before)
-    kind = LandmarkGraph if compared == "landmarks" else LibraryGraph
-    graph = kind(layout, supplied.table, overrides, job.config, earlier, stored, need.room)
+    kind = LandmarkGraph if job.config.distances.pairs == "landmarks" else LibraryGraph
+    graph = kind(layout, supplied.table, overrides, job.config, earlier, stored)
+    amounts = Amounts.of(graph)
+    need = need_of(amounts, job.workers, job.memory, job.scheduler)
+    graph = replace(graph, room=need.room)
     plan = plan_run(graph, store, before, job.workers, need)
     stale = _stale_labels(job, supplied, graph.names, then)
     return Prepared(

@@ -8,10 +8,12 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from motionary.catalog import Catalog
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.snapshot import OVERVIEW, Snapshot, next_snapshot_id, publish
+from motionary.catalog.store import Store
 from motionary.catalog.views.overview import overview_page
 from motionary.pipeline.task import MAKES, TaskReport
 from motionary.workflows.preparation import Prepared
@@ -90,8 +92,20 @@ def _record(
         "quarantined": store.rows(tables["quarantine"]),
         "clusters": store.rows(tables["references"]),
         "clips_read": ready.plan.to_read,
-        "pairs_computed": ready.plan.to_compare,
+        "pairs_computed": ready.plan.to_store + _passing_pairs(store, made),
         "stage_seconds": list(seconds.items()),
         "side": ready.side,
     }
     return pa.Table.from_pylist([row], schema=SCHEMAS["runs"])
+
+
+def _passing_pairs(store: Store, made: Sequence[TaskReport]) -> int:
+    """Add up what tasks compared and did not keep, as they say."""
+    counts = [
+        pc.sum(store.load(report.key, table, ["compared"])["compared"]).as_py() or 0
+        for report in made
+        if report.computed
+        for table in ("assigned", "refined")
+        if table in MAKES[report.stage]
+    ]
+    return sum(counts)

@@ -41,7 +41,7 @@ def mapped_array(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
             folder = tempfile.gettempdir()
             raise OSError(
                 error.errno,
-                f"{folder} has no room for {size / 1e9:.1f} GB of distances ({error.strerror}); "
+                f"{folder} has no room for {size / 1e9:.3g} GB of temporary files ({error.strerror}); "
                 "set TMPDIR to a folder of a larger disk",
             ) from error
         return np.asarray(np.memmap(file, dtype, "r+", shape=shape))

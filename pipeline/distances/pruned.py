@@ -196,10 +196,10 @@ def _around(mu: float) -> tuple[np.float32, float]:
     """Return the greatest float32 that is not above mu, and the one above it."""
     with np.errstate(over="ignore"):
         kept = np.float32(mu)
-    # As Python's floats: NumPy would round mu to float32 before it compares.
-    if float(kept) > float(mu):
-        kept = np.nextafter(kept, np.float32(-np.inf))
-    return kept, float(np.nextafter(kept, np.float32(np.inf)))
+        # As Python's floats: NumPy would round mu to float32 before it compares.
+        if float(kept) > float(mu):
+            kept = np.nextafter(kept, np.float32(-np.inf))
+        return kept, float(np.nextafter(kept, np.float32(np.inf)))
 
 
 def _squared(limit: float, dtype: np.dtype) -> np.floating:

@@ -58,6 +58,10 @@ class Dendrogram:
     published: Cut | None
 
 
+class TooFewClipsError(ValueError):
+    """Too few clips can be read for what is asked; the message says what to do."""
+
+
 def cluster(
     ingested: pa.Table, pairs: Parts, labels: pa.Table, overrides: pa.Table, config: ClusterConfig
 ) -> dict[str, pa.Table]:
@@ -81,10 +85,20 @@ def cluster(
     dict of str to pyarrow.Table
         `clips` (with their supplied labels), `linkage`, `partitions`, `cuts` and `groups`; clips stand in
         clip_id order.
+
+    Raises
+    ------
+    TooFewClipsError
+        More clusters are asked for.
     """
     clips = join_labels(ingested.sort_by("clip_id"), labels)
     if len(clips) == 0:
         return {name: TABLES[name].empty_table() for name in MAKES} | {"clips": clips}
+    if config.n_clusters is not None and config.n_clusters > len(clips):
+        raise TooFewClipsError(
+            f"{config.n_clusters} clusters are asked for, and of the clips to cluster {len(clips)} can be "
+            "read; ask for fewer clusters, or for none, and see in quarantine why the others cannot"
+        )
     classes = classes_of(clips, overrides, config.label_column)
     dendrograms = _dendrograms(clips["clip_id"], pairs, config, classes)
     published = next(one.published for one in dendrograms if one.published is not None)

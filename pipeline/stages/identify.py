@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 import pyarrow as pa
-from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from motionary.pipeline.tables import TABLES
 
-VERSION = 1
+VERSION = 2
 MAKES = ("members", "lineage")
 
 
@@ -65,19 +66,32 @@ Shared = Counter[tuple[int, int | None]]
 
 def _numbers(shared: Shared, unused: int) -> dict[int, int]:
     groups = sorted({group for group, _ in shared})
-    earlier = sorted({one for _, one in shared if one is not None})
-    overlap = np.array([[shared[group, one] for one in earlier] for group in groups])
-    overlap = overlap.reshape(len(groups), len(earlier))
-    chosen = {
-        groups[row]: earlier[column]
-        for row, column in zip(*linear_sum_assignment(overlap, maximize=True), strict=True)
-        if overlap[row, column]
-    }
+    chosen = _matched(groups, shared)
     for group in groups:
         if group not in chosen:
             chosen[group] = unused
             unused += 1
     return chosen
+
+
+def _matched(groups: list[int], shared: Shared) -> dict[int, int]:
+    """Match groups with earlier clusters such that most clips are in both; few of all pairs share any."""
+    pairs = sorted((group, one, clips) for (group, one), clips in shared.items() if one is not None)
+    if not pairs:
+        return {}
+    row_of, earlier = {group: row for row, group in enumerate(groups)}, sorted({one for _, one, _ in pairs})
+    column_of = {one: column for column, one in enumerate(earlier)}
+    # The matching takes every row: one more column a row stands for none, and a clip more everywhere keeps
+    # that from being a zero, which a sparse matrix does not hold.
+    none = range(len(earlier), len(earlier) + len(groups))
+    rows = [row_of[group] for group, _, _ in pairs] + [*range(len(groups))]
+    places = rows, [column_of[one] for _, one, _ in pairs] + [*none]
+    weights = np.array([clips + 1 for _, _, clips in pairs] + [1] * len(groups), float)
+    overlap = csr_array((weights, places), shape=(len(groups), none.stop))
+    columns = min_weight_full_bipartite_matching(overlap, maximize=True)[1]
+    return {
+        group: earlier[column] for group, column in zip(groups, columns, strict=True) if column < len(earlier)
+    }
 
 
 def _lineage_rows(shared: Shared, number: Mapping[int, int], previous: set[int], after: str) -> list[dict]:

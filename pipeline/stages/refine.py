@@ -19,7 +19,7 @@ VERSION = 1
 MAKES = ("refined",)
 
 Members = Sequence[tuple[str, str]]
-"""The clips of a group in clip_id order, each with the key of its content."""
+"""The clips of a group in clip_id order, each with what it is drawn by, where landmarks are."""
 
 
 def refine(
@@ -60,8 +60,8 @@ def refine(
         parts = compared = np.zeros(len(group), np.int64)
         if to_part(group, threshold):
             asked = ClipFrames([frames[clip_id] for clip_id, _ in group], measure)
-            keys = [key for _, key in group]
-            parts, compared = landmarks.refine(keys, asked, config, threshold, most), asked.compared
+            contents = [content for _, content in group]
+            parts, compared = landmarks.refine(contents, asked, config, threshold, most), asked.compared
         _, first = np.unique(parts, return_index=True)
         columns["clip_id"] += [clip_id for clip_id, _ in group]
         columns["first"] += [group[place][0] for place in first[parts].tolist()]

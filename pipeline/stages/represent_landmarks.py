@@ -86,11 +86,13 @@ class _ComparedInside:
     def sums(self, column: str, clusters: Collection[int]) -> NDArray[np.float64]:
         ids, sums = self.clip_ids.to_pylist(), np.zeros(len(self.clip_ids))
         measure = Measure((column,), self.thresholds)
+        asked = np.flatnonzero(np.isin(self.clusters, [*clusters]))
+        frames_by_clip = frames_of(self.resampled, [ids[place] for place in asked])
         for cluster_id in sorted(clusters):
             members = np.flatnonzero(self.clusters == cluster_id)
             own = [ids[place] for place in members]
             some = sample_clips([self.digests[one] for one in own], LEAST_LANDMARKS)
-            frames = [*frames_of(self.resampled, own).values()]
+            frames = [frames_by_clip[one] for one in own]
             found = measure.between(frames, [frames[place] for place in some])[0]
             found[some, np.arange(len(some))] = 0
             sums[members] = rounded(found).sum(axis=1)

@@ -167,7 +167,7 @@ def test_a_full_disk_is_named_before_a_page_is_touched(folder, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("os.posix_fallocate", full)
-    with pytest.raises(OSError, match=f"{folder} has no room for 8.0 GB .* set TMPDIR") as refused:
+    with pytest.raises(OSError, match=f"{folder} has no room for 8 GB .* set TMPDIR") as refused:
         mapped_array((10**9,), np.float64)
     assert refused.value.errno == errno.ENOSPC
     assert [*folder.iterdir()] == []

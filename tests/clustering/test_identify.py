@@ -1,5 +1,6 @@
 """Clusters keep their numbers: as many clips as can be stay in a cluster of the same number."""
 
+import tracemalloc
 from itertools import permutations
 
 import pyarrow as pa
@@ -53,6 +54,23 @@ def test_the_order_of_the_groups_says_nothing():
     _, made = chain({"a": 0, "b": 0, "c": 1}, {"a": 1, "b": 1, "c": 0})
     assert clusters(made) == {"a": 1, "b": 1, "c": 2}
     assert events(made, 1) == [("kept", 1, 1, 2), ("kept", 2, 2, 1)]
+
+
+def test_thousands_of_clusters_are_not_laid_out_as_a_square():
+    state = {f"{clip:05d}": clip // 2 for clip in range(10_000)}
+    before = chain(state)[-1]
+    after = {clip: group + (number % 7 == 0) for number, (clip, group) in enumerate(state.items())}
+    names = {one: one for one in state}
+    tracemalloc.start()
+    made = identify(groups_of(after), before["members"], before["lineage"], names, "000001")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * 5_000**2 / 4
+    kept = sum(
+        one == other
+        for one, other in zip(made["members"]["cluster_id"], before["members"]["cluster_id"], strict=True)
+    )
+    assert kept > 8_000
 
 
 def test_a_split_keeps_the_number_for_the_larger_part():

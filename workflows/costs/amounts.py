@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
+from motionary.pipeline.graph import LibraryGraph
 from motionary.pipeline.layout import Layout
 from motionary.pipeline.readers.library import Source
 from motionary.pipeline.readers.zipped import archive_of
@@ -24,6 +25,8 @@ class Amounts:
     clips : int
     batch, file : int
         Bytes of the files of the largest batch, and of the largest clip.
+    largest : str
+        That clip.
     tile : int
         Pairs of the largest tile.
     library : int
@@ -37,25 +40,28 @@ class Amounts:
     clips: int
     batch: int
     file: int
+    largest: str
     tile: int
     library: int
     landmarks: int | None = None
     pruned: bool = False
 
     @staticmethod
-    def of(layout: Layout, landmarks: int | None = None, *, pruned: bool = False) -> Amounts:
-        """Read them off a library's layout."""
+    def of(graph: LibraryGraph) -> Amounts:
+        """Read them off a library's graph."""
+        layout, config = graph.layout, graph.config
         sizes = clip_sizes(layout)
         batches = [sum(sizes[clip.clip_id] for clip in batch) for batch in layout.batches]
-        sides = sorted(map(len, layout.sides), reverse=True)
+        sides = sorted(map(len, graph.compared_sides), reverse=True)
         return Amounts(
             clips=len(sizes),
             batch=max(batches, default=0),
             file=max(sizes.values(), default=0),
+            largest=max(sizes, key=lambda one: sizes[one], default=""),
             tile=sides[0] * sides[min(1, len(sides) - 1)] if sides else 0,
             library=sum(batches),
-            landmarks=landmarks,
-            pruned=pruned,
+            landmarks=config.clusters.landmarks,
+            pruned=config.distances.pairs == "pruned",
         )
 
     @property

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from tempfile import TemporaryDirectory
 
@@ -87,6 +88,7 @@ class Calibration:
         What comparing takes.
     squares : Squares
         What grows with the square of the clips takes.
+    clusters : int
     concentration : float
         Sum of the squares of the clusters' shares of the clips.
     starting : float
@@ -105,6 +107,7 @@ class Calibration:
     stages: dict[str, Share]
     tile: Tile
     squares: Squares
+    clusters: int
     concentration: float
     starting: float
     seconds: float
@@ -146,7 +149,8 @@ class _SampleRun:
     def warm_up(self) -> None:
         """Run on a few clips first: what is imported and loaded once is no cost of the clips."""
         few = self._graph_of(in_two_sides([batch[:2] for batch in self._sample.batches[:2]]))
-        self._rest(few, [self._run(task) for task in few.ingested])
+        with suppress(UserError):  # others of the sample may do
+            self._rest(few, [self._run(task) for task in few.ingested])
 
     def whole(self) -> list[TaskReport]:
         """Read batches while there is time, then do all else with those."""
@@ -181,7 +185,10 @@ class _SampleRun:
         made = read + [self._run(task) for task in graph.comparison() if task.stage != "ingest"]
         members = self.store.load(graph.identified.key, "members")
         if len(members) < 2:
-            raise UserError(f"of {len([*graph.layout])} clips that were tried, {len(members)} can be read")
+            raise UserError(
+                f"of {len([*graph.layout])} clips that were tried, {len(members)} can be read, and a plan "
+                "takes two; a run says of each file why not"
+            )
         representation = graph.representation(members, nobody)
         made.append(self._run(representation))
         references = self.store.load(representation.key, "represented")
@@ -220,6 +227,7 @@ def _measured(run: _SampleRun, reports: Sequence[TaskReport], start: float, star
         stages={stage: _share(stage, reports) for stage in graph.tasks_by_stage()},
         tile=_tile(run, compared, _share("compare", reports).disk),
         squares=time_squares(store, ingested, pairs, features, graph.config),
+        clusters=len(counts),
         concentration=float(((counts / len(members)) ** 2).sum()),
         starting=starting,
         seconds=time.perf_counter() - start,

@@ -23,7 +23,7 @@ _OF_PAIR, _OF_BYTE = 40.0, 0.65
 def needed_bytes(amounts: Amounts, plan: Plan) -> int:
     """Say about how much a run writes: of the clips that are read, and of the pairs that are kept."""
     read = amounts.library * plan.to_read / max(amounts.clips, 1)
-    return round(_OF_BYTE * read + _OF_PAIR * plan.to_compare * (not amounts.pruned))
+    return round(_OF_BYTE * read + _OF_PAIR * plan.to_store * (not amounts.pruned))
 
 
 def refuse_small_disks(store: Store, amounts: Amounts, plan: Plan, need: Need) -> None:
@@ -42,7 +42,7 @@ def refuse_small_disks(store: Store, amounts: Amounts, plan: Plan, need: Need) -
         )
     folder = tempfile.gettempdir()
     free = shutil.disk_usage(folder).free
-    if plan.to_compare and need.scratch > free:
+    if plan.to_store and need.scratch > free:
         raise UserError(
             f"clustering takes {size_text(need.scratch)} of temporary files and {size_text(free)} is free at "
             f"{folder}; make room there, or set TMPDIR to a folder of a larger disk{_fewer_pairs(amounts)}"

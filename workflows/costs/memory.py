@@ -32,12 +32,15 @@ _READ, _PARSED = 3.0, 16.0  # a byte of a batch's files, as tables and Parquet; 
 _ANY = 30e6  # a task, whatever it does
 _COMPARED = 500.0  # a pair of a tile: 456 of 256 clips with 256
 _CLUSTERED = 8e3  # a clip that is clustered: seven dendrograms, their cuts, the graph of its nearest others
+_SEEN = 1 / 16  # of the square of those, a bit a pair: see stages.columns.mapped_distances
 _LINKED = 8.0  # of the square of the landmarks, and of a group that is refined: see stages.cluster
 _NAMED = 600.0  # a clip in a task over the whole library: what it is called, its digest, its distance
 _POSED = 0.3  # a byte of the library, as poses at 30 frames a second: 309 bytes a frame, see stages.represent
 _STYLED, _AVERAGED, _ANALYSED = 2.6e3, 13e3, 62e3  # a clip of some 31 joints: see stages.style
 _LARGEST_CLUSTER = 0.25  # of all clips: what is represented and styled cannot be divided further
 _SCRATCH = 16.0  # a pair, in temporary files while it is clustered: see clustering.linkage and mapped
+
+_MERGED = 0.1  # a byte of the library, merged frames of clips that are refined: .06 of embedded ones
 
 _SLACK = 64e6
 """Bytes left beside the room of a task: what a part takes while it is read."""
@@ -63,6 +66,8 @@ class Need:
     processes : int
     base : int
         What the processes hold before they have anything to do.
+    file : str
+        The clip of the largest file, which must be read in one piece.
     stages : mapping of str to int
         What the largest task of each stage holds beside that.
     scratch : int
@@ -76,6 +81,7 @@ class Need:
     workers: int
     processes: int
     base: int
+    file: str
     stages: Mapping[str, int]
     scratch: int
 
@@ -112,8 +118,10 @@ def need_of(amounts: Amounts, workers: int, memory: int | None, scheduler: str |
     room = ROOM if allowed is None else round(min(max(allowed - base - _SLACK, _SLACK), ROOM))
     stages = {stage: round(size) for stage, size in _tasks(amounts, room).items()}
     most = max(_at_once(stage, at_once) * size for stage, size in stages.items())
-    scratch = 0 if amounts.pruned else round(_SCRATCH * amounts.clustered * (amounts.clustered - 1) / 2)
-    return Need(base + most, allowed, room, at_once, processes, base, stages, scratch)
+    scratch = 0.0 if amounts.pruned else _SCRATCH * amounts.clustered * (amounts.clustered - 1) / 2
+    if amounts.landmarks is not None:
+        scratch += at_once * _LINKED * amounts.landmarks**2 + _MERGED * amounts.library
+    return Need(base + most, allowed, room, at_once, processes, base, amounts.largest, stages, round(scratch))
 
 
 def refuse(need: Need) -> None:
@@ -128,7 +136,7 @@ def refuse(need: Need) -> None:
         return
     raise UserError(
         f"the run needs about {size_text(need.bytes)} of memory and {size_text(need.allowed)} is allowed: "
-        f"{_processes_text(need)} {size_text(need.base)}, and {need.largest} "
+        f"{_processes_text(need)} {size_text(need.base)}, and {_largest_text(need)} "
         f"{size_text(need.bytes - need.base)}; {' or '.join(_mends(need))}"
     )
 
@@ -144,18 +152,22 @@ def _tasks(amounts: Amounts, room: int) -> dict[str, float]:
     read, clips = _READ * amounts.batch, amounts.clips
     poses, averages = _POSED * amounts.library, _AVERAGED * clips
     undivided = _LARGEST_CLUSTER * poses, _LARGEST_CLUSTER * (averages + _ANALYSED * clips)
+    seen = 0 if amounts.pruned else _SEEN * amounts.clustered**2
     held = {
         "ingest": read + _PARSED * amounts.file,
         "resample": read,
         "compare": _COMPARED * amounts.tile,
-        "cluster": _CLUSTERED * amounts.clustered + _NAMED * (clips - amounts.clustered),
+        "cluster": _CLUSTERED * amounts.clustered + _NAMED * (clips - amounts.clustered) + seen,
+        "identify": _NAMED * clips,
         "represent": _NAMED * clips + min(poses, max(room, undivided[0])),
+        "name": _NAMED * clips,
         "align": read + _NAMED * clips,
         "style": _STYLED * clips + max(min(averages, room), undivided[1]),
     }
     if amounts.landmarks is not None:
         square = _LINKED * amounts.landmarks**2
-        held |= {"assign": read, "stand": square, "refine": square}
+        held |= {"sample": read, "assign": read, "stand": square, "refine": square}
+        held |= {"regroup": _NAMED * clips}
     return {stage: _ANY + size for stage, size in held.items()}
 
 
@@ -165,6 +177,10 @@ def _at_once(stage: str, workers: int) -> int:
 
 def _processes_text(need: Need) -> str:
     return "its process holds" if need.processes == 1 else f"its {need.processes} processes hold"
+
+
+def _largest_text(need: Need) -> str:
+    return f"{need.largest} of {need.file}" if need.largest == "ingest" else need.largest
 
 
 def _mends(need: Need) -> list[str]:
@@ -177,5 +193,7 @@ def _mends(need: Need) -> list[str]:
         if base + most <= need.allowed:
             mends.append(f"use --workers {fewer}")
             break
+    if need.largest == "ingest":
+        mends.append("take that file out")
     mends.append(f"allow more: --memory {-(-need.bytes // 10**8) / 10:g}GB")
     return mends

@@ -17,12 +17,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from motionary.pipeline.clustering.landmark_steps import REPRESENTATIVES
 from motionary.pipeline.task import MAKES, Task
 from motionary.workflows.costs.amounts import clip_sizes
 from motionary.workflows.costs.calibration import Calibration, calibrate
 from motionary.workflows.costs.disk import free_bytes
 from motionary.workflows.costs.foretold import Elapsed, Foretold, StageCost
-from motionary.workflows.costs.memory import ONE_TASK
+from motionary.workflows.costs.memory import ONE_TASK, refuse
 from motionary.workflows.costs.sample import sample_size
 from motionary.workflows.errors import UserError
 from motionary.workflows.preparation import Job, Prepared, prepare
@@ -34,7 +35,7 @@ _WORTH_IT = 5_000
 """Clips from which on a run foretells its time: less than a few of a hundred parts of it go into that."""
 
 # Of two processes on two cores that were idle otherwise; the calibration's own start is added.
-_STARTING = 4.0  # seconds until workers of this machine are up
+SECONDS_TO_START = 4.0  # until workers of this machine are up: they import what this process has imported
 _HANDED = 2e-3  # a task, in the process that hands it out: 2,000 empty tasks
 _PUBLISHED, _PUBLISHED_CLIP = 2.0, 3e-4  # seconds: the overview page of 80 and of 10,000 clips
 _TOGETHER = 1.1  # times slower is a core whose neighbour works too: `make bench`, two threads
@@ -60,10 +61,12 @@ def foretell(
     Raises
     ------
     CatalogError, UserError
-        As `motionary.workflows.preparation.prepare`; or nothing of the sample can be read.
+        As `motionary.workflows.preparation.prepare`; the run would be refused for want of memory; or of the
+        sample not two clips can be read.
     """
     start = time.perf_counter()
     ready = prepare(job)
+    refuse(ready.need)
     listing = time.perf_counter() - start
     say(_trying(ready))
     return foretold_by(ready, calibrate(ready.graph, compiling), listing)
@@ -171,22 +174,26 @@ def _stages(ready: Prepared, measured: Calibration, library: _Library) -> Iterab
     graph, plan, shares = ready.graph, ready.plan, measured.stages
     to_read = min(1.0, plan.to_read / library.clips)
     every = library.clips * (library.clips - 1) / 2
-    to_compare = plan.to_compare / every if every else 0.0
+    a_pair = library.pairs / every if every else 0.0
+    passing = plan.to_compare - plan.to_store
     clustered = not graph.is_stored(graph.clustered.key, MAKES["cluster"])
     touched = affected(ready) if clustered else 0.0
-    pairs = to_compare * library.pairs
     missing = [task for task in graph.compared if not graph.is_stored(task.key, task.makes)]
     seconds = {
         "ingest": shares["ingest"].seconds * library.by_bytes * to_read,
         "resample": shares["resample"].seconds * library.by_bytes * to_read,
-        "compare": _compare_seconds(missing, pairs, measured, library) if missing else 0.0,
+        "compare": _compare_seconds(missing, plan.to_store * a_pair, measured, library),
+        "assign": _pairs_seconds(_assigned_pairs(measured, library) if passing else 0.0, measured, library),
+        "refine": _pairs_seconds(passing * a_pair, measured, library),
         "cluster": _cluster_seconds(measured, library) * clustered,
         "identify": shares["identify"].seconds * clustered,
-        "represent": _represent_seconds(measured, library, touched) * clustered,
+        "represent": _represent_seconds(ready, measured, library, touched) * clustered,
         "align": shares["align"].seconds * library.by_clips * touched,
         "style": shares["style"].seconds * library.by_clips * touched,
         "name": shares["name"].seconds * clustered,
     }
+    kept = library.clustered * (library.clustered - 1) / 2
+    to_compare = min(1.0, plan.to_store * a_pair / kept) if kept else 0.0
     part = {"ingest": to_read, "resample": to_read, "compare": to_compare, "align": touched, "style": touched}
     tasks = graph.tasks_by_stage() | {"compare": len(missing)}
     for stage in tasks:
@@ -195,7 +202,6 @@ def _stages(ready: Prepared, measured: Calibration, library: _Library) -> Iterab
         if stage in ("ingest", "resample"):
             disk *= library.length
         if stage == "compare":
-            kept = library.clustered * (library.clustered - 1) / 2
             disk = len(graph.compared) * measured.tile.disk + kept * measured.tile.pair_disk
         share = part.get(stage, float(clustered))
         count = tasks[stage] if stage == "compare" else math.ceil(tasks[stage] * share)
@@ -208,7 +214,17 @@ def _compare_seconds(
 ) -> float:
     tile, length = measured.tile, library.length
     read = sum(len(keys) for task in missing for _, keys in task.reads)
-    return len(missing) * tile.alone + read * tile.batch * length + pairs * tile.pair * length**2
+    alone = len(missing) * tile.alone + read * tile.batch * length
+    return alone + _pairs_seconds(pairs, measured, library)
+
+
+def _pairs_seconds(pairs: float, measured: Calibration, library: _Library) -> float:
+    return pairs * measured.tile.pair * library.length**2
+
+
+def _assigned_pairs(measured: Calibration, library: _Library) -> float:
+    """Count the pairs of clips with landmarks that stand for groups, were these as many as in the sample."""
+    return library.readable * REPRESENTATIVES * measured.clusters
 
 
 def _cluster_seconds(measured: Calibration, library: _Library) -> float:
@@ -217,11 +233,12 @@ def _cluster_seconds(measured: Calibration, library: _Library) -> float:
     return max(short - square * few**2, 0.0) + square * library.clustered**2
 
 
-def _represent_seconds(measured: Calibration, library: _Library, touched: float) -> float:
+def _represent_seconds(ready: Prepared, measured: Calibration, library: _Library, touched: float) -> float:
     squares, frames = measured.squares, measured.frames / max(measured.clips - measured.quarantined, 1)
     alike = measured.concentration * library.readable**2 * frames * library.length * squares.similarity
     read = measured.stages["represent"].seconds * library.by_clips
-    return library.pairs * squares.passing + touched * (read + alike)
+    passed = 0.0 if ready.amounts.landmarks is not None else library.pairs  # by landmarks it reads no pairs
+    return passed * squares.passing + touched * (read + alike)
 
 
 def affected(ready: Prepared) -> float:
@@ -235,7 +252,7 @@ def affected(ready: Prepared) -> float:
 
 
 def _elapsed(stages: Sequence[StageCost], workers: int, undivided: float) -> Elapsed:
-    seconds = undivided + (_STARTING if workers > 1 else 0.0)
+    seconds = undivided + (SECONDS_TO_START if workers > 1 else 0.0)
     alone = seconds
     for one in stages:
         alone += _HANDED * one.tasks

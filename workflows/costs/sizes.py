@@ -7,6 +7,8 @@ import re
 
 _SIZE = re.compile(r"\d+(\.\d*)?\s*([kmgt]i?)?b?", re.IGNORECASE)
 
+_LONGEST = 30  # characters; of a hundred digits nothing can be made
+
 
 def parse_size(text: str) -> int:
     """Read a size: 4GB is 4e9 bytes, 4GiB 2^32.
@@ -18,7 +20,7 @@ def parse_size(text: str) -> int:
     """
     from dask.utils import parse_bytes
 
-    size = parse_bytes(text) if _SIZE.fullmatch(text.strip()) else 0
+    size = parse_bytes(text) if _SIZE.fullmatch(text.strip()) and len(text) < _LONGEST else 0
     if size <= 0:
         raise ValueError(f"{text!r} is no size; write it as 4GB or 512MiB")
     return size
