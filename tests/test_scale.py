@@ -164,7 +164,7 @@ def test_the_model_is_this_arithmetic():
     assert cluster.elapsed == cluster.work == pytest.approx(1e-6 * 142_000**2)
     assert found.stages[REST].elapsed == pytest.approx(5)
     assert found.seconds == pytest.approx(ingest.elapsed + compare.elapsed + cluster.elapsed + 5)
-    assert found.disk["pairs"] == pytest.approx(50 * pairs)
+    assert found.disk["pairs"] == pytest.approx(50 * pairs, rel=0.01)
     assert found.disk["frames"] == pytest.approx(26_000 * 142_000)
     assert found.memory == pytest.approx(2e8 + 1e4 * 142_000 + 5 * 142_000**2, rel=1e-3)
     assert found.frames_a_clip == 70

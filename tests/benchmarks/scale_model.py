@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from motionary.pipeline.task import MAKES
+from motionary.workflows.costs.memory import ONE_TASK
 from tests.benchmarks.scale_graph import GraphSize
 from tests.benchmarks.scale_run import Measured
 
-DIVIDED = ("ingest", "resample", "compare", "align")
+DIVIDED = tuple(stage for stage in MAKES if stage not in ONE_TASK)
 """Stages of many tasks; every other is one task, in one process."""
 REST = "start, plan, publish"
 """What the clock shows beyond the stages, waiting for the last of their tasks among it."""
@@ -28,7 +30,7 @@ ASSUMPTIONS = (
     "with the square of their length, other stages in proportion: assumed, not measured.",
     "Memory is a sum of a part for the processes, one for the clips and one for the pairs, fitted; "
     "--memory holds it to less.",
-    "Pairs on disk are in proportion to the pairs, every other table to the frames.",
+    "Pairs on disk go on by their exponent, every other table in proportion to the frames.",
     "No worker is lost, and nobody else uses them.",
 )
 
@@ -166,12 +168,13 @@ def model(
     stages = {}
     for stage, growth in growth_by_stage(runs).items():
         work = growth.at(clips) * longer ** FRAMES_POWER.get(stage, 0)
-        tasks = graph.tasks.get(stage, 1)
+        # The graph is that of all pairs; further stages have a task a batch, as reading has.
+        tasks = 1 if stage in ONE_TASK else graph.tasks.get(stage, graph.tasks["ingest"])
         elapsed = work / workers + work / tasks if stage in DIVIDED else work
         stages[stage] = StageModel(work, min(elapsed, work), tasks)
-    pairs = clips * (clips - 1) / (last.clips * (last.clips - 1))
+    pairs = fitted([run.clips for run in runs], [run.tables["pairs"] for run in runs]).at(clips)
     disk = {
-        table: size * (pairs if table == "pairs" else longer * clips / last.clips)
+        table: pairs if table == "pairs" else size * longer * clips / last.clips
         for table, size in last.tables.items()
     }
     tiles = graph.tasks["compare"]

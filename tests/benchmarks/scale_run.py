@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import IO
 
 from motionary.catalog import Catalog
+from motionary.pipeline.layout import digest_of_settings
 from motionary.pipeline.synthetic import write_library
+from motionary.workflows.workplace import software
 from tests.benchmarks.process_tree import TreePeak, watched
 from tests.benchmarks.scale_kernel import kernel_seconds_a_pair
 from tests.torture.world import PROGRAM, motionary
@@ -109,7 +111,9 @@ def measured_run(
         Told what is being done.
     """
     name = f"{'-'.join(route.name.split())}-{clips}-by-{workers}"
-    kept = folder / f"{name}.json"
+    # What is measured depends on these: a measurement of other arguments or sources is another.
+    about = digest_of_settings(route.arguments, software())
+    kept = folder / f"{name}-{about[:8]}.json"
     if kept.exists():
         say(f"{clips:,} clips, {route.name}: measured before ({kept})")
         return _from_json(kept.read_text())
@@ -162,10 +166,13 @@ def _watched_run(arguments: list[str], log: IO[str]) -> tuple[float, TreePeak]:
     return time.perf_counter() - start, watch.peak
 
 
-def _foretold(arguments: list[str]) -> dict | None:
-    """Ask for the plan; None where a route cannot be planned."""
+def _foretold(arguments: list[str]) -> dict:
     told = motionary("plan", *arguments, "--json")
-    return json.loads(told.stdout) if told.returncode == 0 else None
+    if told.returncode:
+        raise RuntimeError(
+            f"motionary plan {' '.join(arguments)} ended with {told.returncode}: {told.stderr}"
+        )
+    return json.loads(told.stdout)
 
 
 def _of_catalog(catalog: Path) -> dict[str, int | dict[str, float]]:
