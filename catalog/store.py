@@ -107,11 +107,6 @@ class Store:
         """Return where a part lies inside the catalog."""
         return f"tables/{table}/{key}.parquet"
 
-    def has(self, key: str, tables: Iterable[str]) -> bool:
-        """Say whether every one of a result's parts is there."""
-        filesystem = self.filesystem
-        return all(filesystem.exists(self.path(self.part_name(table, key))) for table in tables)
-
     def save(self, key: str, tables: Mapping[str, pa.Table]) -> dict[str, PartFacts]:
         """Write a result's parts, each with its table's schema; a part is on disk when this returns.
 

@@ -146,7 +146,7 @@ def publish_rows() -> Callable[..., Snapshot]:
             keys = [f"of-{next_snapshot_id(store)}" if name in rows else "none"]
             for key in [*keys, *(parts if name == "pairs" else ())]:
                 file = store.part_name(name, key)
-                if not store.has(key, [name]):
+                if store.stored(key, [name]) is None:
                     filled = [_filled(name, row) for row in rows.get(name, ())]
                     store.save(key, {name: pa.Table.from_pylist(filled, SCHEMAS[name])})
                 facts[file] = store.facts(file)

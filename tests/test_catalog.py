@@ -34,8 +34,8 @@ def test_parts_come_back_with_types_units_and_version(store):
     assert back.to_pylist() == MEMBERS.to_pylist()
     assert back.schema.field("cluster_id").type == pa.int32()
     assert back.schema.metadata[b"motionary.schema_version"] == str(VERSION).encode()
-    assert store.has("k", ["members"])
-    assert not store.has("k", ["members", "clips"])
+    assert store.stored("k", ["members"])
+    assert store.stored("k", ["members", "clips"]) is None
 
 
 def test_equal_tables_are_equal_files(store):

@@ -79,7 +79,7 @@ def test_a_reader_that_was_killed_holds_nothing(store, reader, publish_rows):
     gone = vacuum(store, grace_hours=0)
     assert (gone.snapshots, gone.held) == (("000001",), ())
     assert lease_files(store) == []
-    assert not store.has("first", ["pairs"])
+    assert store.stored("first", ["pairs"]) is None
 
 
 @pytest.mark.parametrize("end", ["close", "with", "forget"])

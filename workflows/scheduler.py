@@ -197,7 +197,10 @@ def _client(workers: int, address: str | None) -> Iterator[Client]:
         try:
             client = Client(address, timeout=10)
         except (OSError, ValueError) as error:
-            raise SchedulerError(f"no Dask scheduler answers at {address}: {error}") from None
+            raise SchedulerError(
+                f"no Dask scheduler answers at {address!r}: {error}; start one by dask scheduler, and give "
+                "the address that it prints, as tcp://HOST:8786"
+            ) from None
         with silence_logging_cmgr(logging.CRITICAL), client:
             yield client
         return

@@ -7,9 +7,9 @@
     5. refine      every pair of clips inside a cluster; the same linkage, undone above the same threshold
 
 What a refined cluster falls into are clusters of their own: so a class that the sample missed is found. A
-cluster of more than n clips is refined by these steps again, on n landmarks of its own. That takes at most
-n^2 / 2 pairs, N times the representatives, and about n / 2 for every clip: O(N^1.5) where n goes with the
-square root of N, as it does unless told otherwise.
+cluster of more than n clips is refined by these steps again, on n landmarks of its own. That takes n^2 / 2
+pairs, N times the representatives, and about n / 2 for every clip, more where clusters are refined again:
+O(N^1.5) where n goes with the square root of N, as it does unless told otherwise.
 
 Heights of complete, average and fuzzy linkage are distances of clips, so a part of a library is cut where all
 of it would be. Those of Ward's grow with the clips: of clusters s times as large by sqrt(s). A threshold mu

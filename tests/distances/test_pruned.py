@@ -171,6 +171,21 @@ def test_boxes_further_apart_than_their_limit_prove_it(pair, way):
             assert (placed[2 * run : 2 * run + 2] <= boxes.runs.high[run]).all()
 
 
+def test_without_its_margins_the_limit_would_lose_a_pair():
+    """Squares that are too small to be added to 1 make the cost less than the distance, and than the gap."""
+    clips = [np.zeros((1, 59), np.float32), np.full((1, 59), 1.7e-4, np.float32)]
+    clips[1][0, 0] = 1
+    cost = float(cost_matrix(*clips)[0, 0])
+    assert cost < np.linalg.norm(clips[1].astype(np.float64))
+    least, axes = weighted_distance([cost] * 8), principal_axes(clips)
+    a, b = (boxed_clips([clip], axes) for clip in clips)
+    apart = [
+        runs_apart(a, 0, b, 0, module._squared(limit, clips[0].dtype))
+        for limit in (least / WEIGHTS.sum() * axes.stretch, box_limit(least, WEIGHTS, clips, axes))
+    ]
+    assert apart == [True, False]
+
+
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.integers(1, 40), st.integers(1, 40), st.sampled_from([np.float32, np.float64]))
 def test_boxes_are_apart_just_when_all_gaps_are(seed, m, n, dtype):
