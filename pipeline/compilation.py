@@ -83,7 +83,7 @@ def compile_kernels(announce: Callable[[], object]) -> None:
     Parameters
     ----------
     announce : callable
-        Called before a compilation, which takes some thirty seconds.
+        Called before a compilation, which takes about a minute.
 
     Raises
     ------

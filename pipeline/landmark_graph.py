@@ -141,7 +141,8 @@ class LandmarkGraph(LibraryGraph):
         for task in assigned:
             rows = load(task.key, "assigned", ["clip_id", "group"])
             group_of |= zip(rows["clip_id"].to_pylist(), rows["group"].to_pylist(), strict=True)
-        mu = self._threshold(load(self.clustered.key, "cuts"), len(groups) / max(len(group_of), 1))
+        share = len(groups) / max(len(group_of), 1)
+        mu = threshold_on_all(self.config.clusters, *_published_cut(load(self.clustered.key, "cuts")), share)
         refined = self._refined(group_of, mu, len(groups))
         regrouped = Task(
             "regroup", self.grouped.key, regroup.regroup,
@@ -206,17 +207,6 @@ class LandmarkGraph(LibraryGraph):
             )  # fmt: skip
         return made
 
-    def _threshold(self, cuts: pa.Table, share: float) -> float:
-        """Return mu on all clips, above which groups are undone; infinite where none is."""
-        clusters = self.config.clusters
-        if clusters.threshold is not None:
-            return clusters.threshold
-        (cut,) = [row for row in cuts.to_pylist() if row["primary"]] or [{"published_clusters": 0}]
-        # As many clusters as were asked for are there; and one alone has no strip that could be stretched.
-        if clusters.n_clusters is not None or cut["published_clusters"] <= 1:
-            return inf
-        return threshold_on_all(clusters, cut["published_threshold"], share)
-
     def _refined(self, group_of: dict[str, int], mu: float, most: int) -> list[Task]:
         members: list[list[tuple[str, str]]] = [[] for _ in range(max(group_of.values(), default=-1) + 1)]
         for clip_id in sorted(group_of):
@@ -242,6 +232,14 @@ class LandmarkGraph(LibraryGraph):
 
     def _resampled(self, batches: set[int]) -> Sequence[str]:
         return [self.resampled[number].key for number in sorted(batches)]
+
+
+def _published_cut(cuts: pa.Table) -> tuple[int, float]:
+    """Return how many clusters were published, and where they were cut; of no clips there is no cut."""
+    for row in cuts.to_pylist():
+        if row["primary"]:
+            return row["published_clusters"], row["published_threshold"]
+    return 0, inf
 
 
 def _contents(side: Sequence[Clip]) -> list[tuple[str, str]]:

@@ -34,7 +34,7 @@ def examples_of(command):
     head, *lines = (command.epilog or "").splitlines()
     assert head == "Examples:"
     assert all(len(line) <= 78 and line[:2] in ("", "# ", "$ ") for line in lines), "a terminal folds it"
-    return [line[2:] for line in lines if line.startswith("$")]
+    return [line[2:].replace(r"\[", "[") for line in lines if line.startswith("$")]
 
 
 def words_of(example):
@@ -64,6 +64,12 @@ def test_examples_are_understood(path, command):
         with found.make_context(" ".join(used), called):  # an option that is not there is a usage error
             pass
     assert own, "no example calls the command itself"
+
+
+def test_what_looks_like_markup_is_shown(motionary):
+    code, out, _ = motionary("run", "--help")
+    assert code == 0
+    assert "--label-pattern '(?P<action>[a-z]+)_'" in out
 
 
 def test_an_unknown_option_in_an_example_would_be_seen():

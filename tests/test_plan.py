@@ -301,6 +301,26 @@ def test_what_is_stored_costs_nothing(demo_library, demo_catalog):
     assert told.plan.to_read == 0
 
 
+def test_what_is_clustered_otherwise_may_be_aligned_anew(demo_library, demo_catalog):
+    five = PipelineConfig(clusters=ClusterConfig(n_clusters=5))
+    there = prepare(Job([str(demo_library)], demo_catalog, five, demo_library / "labels.csv"))
+    told = {one.stage: one for one in foretold_by(there, MEASURED).stages}
+    assert told["ingest"].seconds == told["compare"].seconds == 0
+    assert told["align"].seconds == pytest.approx(80 / 35)
+    assert (
+        there.plan.seconds
+        > dict(there.store.read(there.before.tables["runs"])["stage_seconds"][-1].as_py())["align"] / 2
+    )
+
+
+def test_a_dry_run_is_refused_like_the_run(demo_library, motionary, tmp_path):
+    options = (demo_library, tmp_path / "out", "--memory", "100MB")
+    dry, real = (motionary("run", *options, *more) for more in (("--dry-run",), ()))
+    assert (dry[0], dry[2]) == (real[0], real[2])
+    assert dry[0] == 1
+    assert "clips: 80 new" in dry[1]
+
+
 def test_the_calibration_runs_every_stage_and_leaves_nothing(ready, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     measured = calibrate(ready.graph)

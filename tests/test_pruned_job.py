@@ -72,6 +72,13 @@ def test_other_partitions_are_absent_and_the_pages_say_so(pruned):
             assert "needs two clips" not in page
 
 
+def test_the_summary_says_that_pairs_were_left_out(pruned, motionary):
+    code, out, _ = motionary("status", pruned)
+    kept = len(rows(pruned, "select clip_a from pairs"))
+    assert code == 0
+    assert f"Pruned: {kept} of 435 pairs are at most 0.25 apart" in " ".join(out.split())
+
+
 def test_it_verifies_and_answers(pruned, whole):
     assert [check for check in verify(pruned) if not check.passed] == []
     with Catalog.open(pruned) as some, Catalog.open(whole) as every:

@@ -76,7 +76,7 @@ def run(
         Given the number of tasks by stage, a context whose value is called with the stage of every finished
         task; see `motionary.workflows.progress`.
     compiling : callable
-        Called if the kernels must be compiled first; that takes some thirty seconds, once on a machine.
+        Called if the kernels must be compiled first; that takes about a minute, once on a machine.
     take_over : callable
         Told of a writer of this catalog that died.
     planned : callable

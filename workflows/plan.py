@@ -56,7 +56,8 @@ class Plan:
         took = "how long is not known before a first run"
         if self.seconds is not None:
             took = f"about {time_text(self.seconds)} and what starting takes"
-        todo = f"{self.to_read} to read, {self.to_compare} pairs to compare"
+        about = "" if self.to_store == self.to_compare else "about "
+        todo = f"{self.to_read} to read, {about}{self.to_compare} pairs to compare"
         return f"clips: {clips}; {todo}; {took}; memory: {needed_text(self.memory, self.memory_allowed)}"
 
 
@@ -84,7 +85,8 @@ def plan_run(graph: LibraryGraph, store: Store, before: Snapshot | None, workers
     to_compare = to_store + graph.later_pairs()
     new = len(digests) - len(names)
     removed = len(earlier) - len(names)
-    touched = new + changed + removed
+    alike = graph.earlier.settings.get("cluster") == graph.settings["cluster"]
+    touched = new + changed + removed if alike else len(digests)
     return Plan(
         new=new, changed=changed, renamed=renamed, removed=removed,
         unchanged=len(names) - renamed - changed,

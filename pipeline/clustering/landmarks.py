@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import isinf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ class LandmarkClusters:
     cut : Cut
         Of the landmarks' dendrogram; its threshold is in the landmarks' heights.
     threshold : float
-        The same in the heights of all clips; infinite where a rule found one cluster alone.
+        The same in the heights of all clips; infinite where nothing is undone, see `threshold_on_all`.
     representatives : array (R,)
         Places of the landmarks that stand for the clusters.
     assigned : array (N,)
@@ -126,7 +126,7 @@ def cluster_by_landmarks(
     own_labels = None if labels is None else [labels[place] for place in sample]
     square = distance(sample, sample)
     cut = cut_landmarks(condensed_channels(square), config, share, own_labels)
-    threshold = _threshold_on_all(cut, config, share)
+    threshold = threshold_on_all(config, cut.n_clusters, cut.threshold, share)
     standing = standing_for(merge_key(square, config), cut.labels, representatives)
     assigned = _spread(sample, cut.labels, standing, clips, distance, config)
 
@@ -134,7 +134,7 @@ def cluster_by_landmarks(
         contents = [keys[place] for place in members]
         return refine(contents, _among(distance, members), config, threshold, len(sample), representatives)
 
-    final = len(sample) == clips or config.n_clusters is not None
+    final = len(sample) == clips or isinf(threshold)
     groups = numbered(assigned) if final else _parted(assigned, refined)
     return LandmarkClusters(sample, cut, threshold, sample[standing.places], assigned, groups)
 
@@ -187,13 +187,6 @@ def refine(
         return refine(contents, _among(distance, members), config, threshold, most, representatives)
 
     return _parted(assigned, refined)
-
-
-def _threshold_on_all(cut: Cut, config: ClusterConfig, share: float) -> float:
-    if config.threshold is not None:
-        return config.threshold
-    # One cluster has no strip that could be stretched: where nothing was told apart, nothing is undone.
-    return threshold_on_all(config, cut.threshold, share) if cut.n_clusters > 1 else inf
 
 
 def _spread(

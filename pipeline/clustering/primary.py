@@ -7,7 +7,7 @@ is mu sqrt(share) on a share of them.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,28 @@ def threshold_on_part(config: ClusterConfig, threshold: float, share: float) -> 
     return threshold * sqrt(share) if config.primary == "ward" else threshold
 
 
-def threshold_on_all(config: ClusterConfig, threshold: float, share: float) -> float:
-    """Turn a threshold on a share of the clips into that on all: undoes `threshold_on_part`."""
-    return threshold / sqrt(share) if config.primary == "ward" else threshold
+def threshold_on_all(config: ClusterConfig, clusters: int, threshold: float, share: float) -> float:
+    """Return mu on all clips, above which clusters that were found on a share of them are undone.
+
+    Parameters
+    ----------
+    config : ClusterConfig
+        Its own threshold is that on all.
+    clusters : int
+        Those of the share.
+    threshold : float
+        Where its dendrogram was cut.
+    share : float
+        Its clips, by all.
+
+    Returns
+    -------
+    float
+        Infinite where nothing is undone: as many clusters as were asked for are there, and where nothing was
+        told apart there is no strip that could be stretched.
+    """
+    if config.threshold is not None:
+        return config.threshold
+    if config.n_clusters is not None or clusters <= 1:
+        return inf
+    return threshold / sqrt(share) if config.primary == "ward" else threshold  # undoes `threshold_on_part`

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 FAILED, QUARANTINED, UNVERIFIED = 1, 3, 4
 """Exit codes beside 0, done, and 2, usage: failed; done with quarantined clips; verification failed."""
 
-COMPILING = "compiling the kernels, or waiting for who does: once on a machine, some thirty seconds"
+COMPILING = "compiling the kernels, or waiting for who does: once on a machine, about a minute"
 
 CatalogUrl = Annotated[
     str, typer.Argument(metavar="CATALOG", help="Folder of the catalog, or its fsspec URL.")
@@ -47,7 +47,7 @@ Memory = Annotated[
         "--memory",
         parser=_size,
         metavar="SIZE",
-        help="What all processes may hold together, as 4GB; with --scheduler, one worker.",
+        help="What all processes may hold together, as 4GB; on a running cluster, one worker.",
         show_default="what the machine has",
     ),
 ]
@@ -58,9 +58,10 @@ Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a
 def examples(*lines: str) -> str:
     """Write the end of a command's help: each line a command, with what it gives after a #.
 
-    What it gives stands above it, for a terminal folds lines that are longer than 80 characters.
+    What it gives stands above it, for a terminal folds lines that are longer than 80 characters. What would
+    be markup is escaped.
     """
-    split = (line.partition("  # ") for line in lines)
+    split = (line.replace("[", r"\[").partition("  # ") for line in lines)
     shown = [[f"# {remark}"] * bool(remark) + [f"$ {command}"] for command, _, remark in split]
     return "\n".join(["Examples:", "", *(line for pair in shown for line in pair)])
 

@@ -125,6 +125,7 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Cluster, name and align the motions of LIBRARY into CATALOG."""
+    from motionary.workflows.costs.memory import refuse
     from motionary.workflows.preparation import prepare
     from motionary.workflows.tables import write_json
 
@@ -136,10 +137,13 @@ def run(
     )  # fmt: skip
     if not dry_run:
         _run(job, as_json)
-    elif as_json:
-        write_json(vars(prepare(job).plan))
+        return
+    ready = prepare(job)
+    if as_json:
+        write_json(vars(ready.plan))
     else:
-        print(prepare(job).plan)
+        print(ready.plan)
+    refuse(ready.need)
 
 
 def demo(

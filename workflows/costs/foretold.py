@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from motionary.workflows.costs.memory import Need
@@ -120,8 +120,8 @@ class Foretold:
         free = "" if self.room_on_disk is None else f" of {size_text(self.room_on_disk)} free"
         return "\n".join(
             [
-                str(self.plan),
-                f"{self.clips:,} clips, {read}, {self.merged_frames:,} merged; {self.pairs:,} pairs",
+                str(replace(self.plan, seconds=self.seconds)),
+                f"{self.clips:,} clips, {read}, {self.merged_frames:,} merged; {self.pairs:,} pairs in all",
                 "",
                 *self._by_stage(),
                 "",

@@ -242,9 +242,12 @@ def _represent_seconds(ready: Prepared, measured: Calibration, library: _Library
 
 
 def affected(ready: Prepared) -> float:
-    """Say what share of the clips are of clusters in which a clip comes or goes; all in a first run."""
-    plan, earlier = ready.plan, ready.graph.earlier
-    alike = earlier.settings.get("align") == ready.graph.settings["align"]
+    """Say what share of the clips may be aligned anew: those of clusters in which a clip comes or goes.
+
+    All in a first run, and where they are aligned or clustered otherwise.
+    """
+    plan, earlier, settings = ready.plan, ready.graph.earlier, ready.graph.settings
+    alike = all(earlier.settings.get(stage) == settings[stage] for stage in ("align", "cluster"))
     if ready.before is None or not alike:
         return 1.0
     clusters = max(ready.store.rows(ready.before.tables["references"]), 1)

@@ -49,4 +49,4 @@ def _section(words: Words, command: Any) -> str:
 
 def _examples(command: Any) -> str:
     """Return the lines of a command's examples, what each gives above it."""
-    return command.epilog.removeprefix("Examples:").strip()
+    return command.epilog.removeprefix("Examples:").replace(r"\[", "[").strip()
