@@ -1,6 +1,11 @@
 """What a run will take: sizes, memory and its refusal, the model of time, and the command."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from collections import namedtuple
 from dataclasses import replace
 from pathlib import Path
@@ -345,6 +350,21 @@ def test_of_too_few_clips_there_is_no_plan(demo_library, tmp_path, clips, broken
     said = f"of {clips + broken} clips that were tried, {clips} can be read, and a plan takes two"
     with pytest.raises(UserError, match=said):
         calibrate(graph)
+
+
+def test_a_plan_that_is_ended_leaves_nothing(demo_library, tmp_path):
+    program = "from motionary.workflows.cli import main; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "plan", str(demo_library)],
+        env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while len([*tmp_path.glob("motionary-plan-*")]) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.terminate()
+    process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert [*tmp_path.iterdir()] == []
 
 
 @pytest.mark.parametrize("mu", [1e-9, 0.15])

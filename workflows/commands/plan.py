@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -41,16 +45,31 @@ def plan(**options: Any) -> None:
     from motionary.workflows.tables import write_json
 
     as_json = options.pop("as_json")
-    if options["catalog"] is not None:
-        told = _foretell(job_of(**options))
-    else:
-        with TemporaryDirectory(prefix="motionary-plan-") as folder:
-            nowhere = str(Path(folder, "catalog"))
-            told = replace(_foretell(job_of(**options | {"catalog": nowhere})), room_on_disk=None)
+    with _ended_in_order():
+        if options["catalog"] is not None:
+            told = _foretell(job_of(**options))
+        else:
+            with TemporaryDirectory(prefix="motionary-plan-") as folder:
+                nowhere = str(Path(folder, "catalog"))
+                told = replace(_foretell(job_of(**options | {"catalog": nowhere})), room_on_disk=None)
     if as_json:
         write_json(told.to_json())
     else:
         print(told)
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """Let SIGTERM end this as an interrupt would, so that temporary folders go: they may be large."""
+    before = signal.signal(signal.SIGTERM, _end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _end(*_: object) -> NoReturn:
+    sys.exit(128 + signal.SIGTERM)
 
 
 def _signature() -> inspect.Signature:
