@@ -25,7 +25,8 @@ def print_summary(catalog: Catalog, console: Console) -> None:
     console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
     found = approximation(catalog)
     if found is not None:
-        console.print(f"{found} How far they may be from exact: motionary reproduce landmarks")
+        exact = "motionary reproduce landmarks, on a catalog of all pairs of a smaller library"
+        console.print(f"{found} How far they may be from exact: {exact}")
     if route_of(catalog) == "pruned":
         kept, pairs = len(catalog.pairs), run["clips"] * (run["clips"] - 1) // 2
         mu = catalog.config.clusters.threshold

@@ -97,7 +97,7 @@ def run(
             "--landmarks",
             metavar="N|auto",
             help="For a library too large for all pairs: compare those of N clips (auto: 20 times the root "
-            "of all, 1,000 at least), and the others with clips like them. Nearly the same clusters.",
+            "of all, 1,000 at least), and the others with clips like them. Approximate clusters.",
         ),
     ] = None,
     weights: Annotated[

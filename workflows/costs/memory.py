@@ -193,7 +193,7 @@ def _mends(need: Need) -> list[str]:
         if base + most <= need.allowed:
             mends.append(f"use --workers {fewer}")
             break
-    if need.largest == "ingest":
+    if need.largest == "ingest" and need.base < need.allowed:
         mends.append("take that file out")
     mends.append(f"allow more: --memory {-(-need.bytes // 10**8) / 10:g}GB")
     return mends
