@@ -122,7 +122,8 @@ def test_one_types_is_suggested_clips_and_opens_one(base, page):
     page.goto(base)
     page.keyboard.press("/")
     page.keyboard.type("walk tired", delay=20)
-    page.wait_for_selector("[role=option]")
+    # Of all that was typed: what comes for its beginning is replaced, and with it what is chosen.
+    page.wait_for_selector("[role=option]:has-text('tired')")
     page.keyboard.press("ArrowDown")
     chosen = page.inner_text("[role=option][aria-selected=true]")
     with page.expect_navigation():

@@ -49,8 +49,8 @@ def editor_of(url: str, user: str = "ada") -> LabelEditor:
 
 
 def copied(catalog: str, folder: Path) -> str:
-    """Copy a catalog, to be changed."""
-    return str(shutil.copytree(catalog, folder / "catalog"))
+    """Copy a catalog, to be changed; without the leases of who reads it meanwhile, which come and go."""
+    return str(shutil.copytree(catalog, folder / "catalog", ignore=shutil.ignore_patterns("leases")))
 
 
 def with_mistakes(library: Path, catalog: str, folder: Path, progress: Callable) -> str:

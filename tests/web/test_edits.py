@@ -346,9 +346,9 @@ def test_the_latest_change_is_read_while_others_are_made(url, threads_change_oft
         thread.join()
 
 
-def test_a_catalog_on_s3_is_shown_edited_and_undone(demo_catalog, bucket):
+def test_a_catalog_on_s3_is_shown_edited_and_undone(demo_catalog, bucket, tmp_path):
     url = f"{bucket}/catalog"
-    fsspec.filesystem("s3").put(demo_catalog, url, recursive=True)
+    fsspec.filesystem("s3").put(copied(demo_catalog, tmp_path), url, recursive=True)
     before = state(url)
     with served(url, editor=editor_of(url)) as client:
         assert client.get("/").status_code == 200
