@@ -11,8 +11,7 @@ from __future__ import annotations
 import os
 import signal
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from importlib.metadata import version
@@ -37,6 +36,7 @@ from motionary.workflows.preparation import absolute
 from motionary.workflows.report_page import write_report_page
 from motionary.workflows.run_log import RunLog, logged_stages
 from motionary.workflows.run_report import RunReport, rows
+from motionary.workflows.sigterm import on_sigterm
 
 DONE, FAILED, QUARANTINED = 0, 1, 3
 
@@ -62,9 +62,9 @@ def run_nightly(settings: NightlySettings, log: RunLog) -> RunReport:
     """
     job, begun = settings.job, monotonic()
     report = RunReport(str(settings.file), job.catalog, list(job.libraries), _described(settings))
-    with _on_sigterm(_passed_over):
+    with on_sigterm(_passed_over):
         try:
-            with _on_sigterm(_stop):
+            with on_sigterm(_stop):
                 _publish_and_vacuum(settings, log, report)
         except LimitExceeded as error:
             _failed(log, report, str(error), status="refused")
@@ -206,7 +206,7 @@ def _tell(settings: NightlySettings, log: RunLog, report: RunReport) -> None:
 def _write_page(log: RunLog, report: RunReport, file: Path) -> None:
     """Show what was published; no fault of it, nor SIGTERM meanwhile, keeps the run from being announced."""
     try:
-        with _on_sigterm(_stop), Catalog.open(absolute(report.catalog), report.snapshot_after) as catalog:
+        with on_sigterm(_stop), Catalog.open(absolute(report.catalog), report.snapshot_after) as catalog:
             made = write_report_page(catalog, file)
     except (Exception, Stopped, KeyboardInterrupt) as error:
         log("page", ok=False, error="stopped by SIGTERM" if isinstance(error, Stopped) else str(error))
@@ -229,15 +229,6 @@ def _file_names(folder: Path) -> Iterator[str]:
     for _, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
         yield from (name for name in names if not name.startswith("."))
-
-
-@contextmanager
-def _on_sigterm(handler: Callable[..., object]) -> Iterator[None]:
-    before = signal.signal(signal.SIGTERM, handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _stop(*_: object) -> NoReturn:

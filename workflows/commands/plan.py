@@ -5,8 +5,6 @@ from __future__ import annotations
 import inspect
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +15,7 @@ import typer
 from motionary.workflows.commands.job_options import job_of
 from motionary.workflows.commands.options import COMPILING, stderr_console
 from motionary.workflows.commands.run import run
+from motionary.workflows.sigterm import on_sigterm
 
 if TYPE_CHECKING:
     from motionary.workflows.costs.foretold import Foretold
@@ -45,7 +44,7 @@ def plan(**options: Any) -> None:
     from motionary.workflows.tables import write_json
 
     as_json = options.pop("as_json")
-    with _ended_in_order():
+    with on_sigterm(_end):
         if options["catalog"] is not None:
             told = _foretell(job_of(**options))
         else:
@@ -58,17 +57,8 @@ def plan(**options: Any) -> None:
         print(told)
 
 
-@contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """Let SIGTERM end this as an interrupt would, so that temporary folders go: they may be large."""
-    before = signal.signal(signal.SIGTERM, _end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def _end(*_: object) -> NoReturn:
+    """Leave as an interrupt would, so that temporary folders go: they may be large."""
     sys.exit(128 + signal.SIGTERM)
 
 
