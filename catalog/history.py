@@ -5,6 +5,7 @@ A clip is known by its clip_id, or, where its file was renamed, by its bytes.
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -133,7 +134,8 @@ def run_history(catalog: Catalog) -> pa.Table:
     Returns
     -------
     pyarrow.Table
-        run_id, snapshot, kept, and the columns of `runs` but for settings, seconds by stage and tiles.
+        run_id, snapshot, kept, and the columns of `runs` but for settings, seconds by stage and tiles; and
+        pairs, which of them were compared: all, pruned, landmarks.
     """
     runs = catalog.runs.to_arrow().sort_by("started_at")
     table = runs.select([name for name in runs.column_names if name not in _LEFT_OUT])
@@ -144,7 +146,13 @@ def run_history(catalog: Catalog) -> pa.Table:
     snapshots = [run_id.rpartition("-")[2] for run_id in table["run_id"].to_pylist()]
     there = set(catalog.snapshots())
     kept = [snapshot in there for snapshot in snapshots]
+    routes = [_route(settings) for settings in runs["settings"].to_pylist()]
+    table = table.append_column("pairs", pa.array(routes, _TEXT))
     return table.add_column(1, "snapshot", [snapshots]).add_column(2, "kept", [kept])
+
+
+def _route(settings: str) -> str:
+    return json.loads(settings)["distances"].get("pairs", "all")  # runs of before there were others
 
 
 def _renamed(went: Mapping[str, str], came: Mapping[str, str]) -> dict[str, str]:

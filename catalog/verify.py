@@ -2,13 +2,13 @@
 
 Checks read files one by one or ask SQL for the rows that are wrong, so that a catalog larger than memory can
 be verified. A check that cannot be done, because what it reads is damaged, has failed too: its reason says
-so. Each check opens the tables that it reads and no others, and so cannot fail by damage elsewhere.
+so. Damage elsewhere fails none: SQL opens the tables that a query names and no others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 
 from motionary.catalog.checks.alignments import (
@@ -62,58 +62,37 @@ class Check:
 
 @dataclass(frozen=True)
 class _Rule:
-    """A check: its name, what does it, and the tables it reads; None for all."""
+    """A check: its name and what does it."""
 
     name: str
     find: Callable[[Catalog], Found]
-    reads: Sequence[str] | None
 
 
 _MANIFEST = "the manifest reads"
 _RULES = (
-    _Rule("the manifest is complete", manifest_is_complete, None),
-    _Rule("files are as they were written", files_are_as_written, None),
-    _Rule("plain pyarrow reads every file", parquet_reads, None),
-    _Rule("files have their tables' schemas", schemas_are_the_tables, None),
-    _Rule("clips are unique and sorted", clips_are_unique_and_sorted, ("clips",)),
-    _Rule("inputs are clips or quarantined", clips_are_accounted_for, ("clips", "quarantine", "inputs")),
+    _Rule("the manifest is complete", manifest_is_complete),
+    _Rule("files are as they were written", files_are_as_written),
+    _Rule("plain pyarrow reads every file", parquet_reads),
+    _Rule("files have their tables' schemas", schemas_are_the_tables),
+    _Rule("clips are unique and sorted", clips_are_unique_and_sorted),
+    _Rule("inputs are clips or quarantined", clips_are_accounted_for),
     *(
-        _Rule(f"clips have their {table}", partial(clips_have_their_frames, table=table), ("clips", table))
+        _Rule(f"clips have their {table}", partial(clips_have_their_frames, table=table))
         for table in ("frames", "features", "resampled")
     ),
-    _Rule("merged frames cover every frame", merged_frames_cover_every_frame, ("features", "resampled")),
-    _Rule(
-        "the run counted what is there", the_run_counted_them, ("clips", "quarantine", "references", "runs")
-    ),
-    _Rule("every pair is there once", pairs_are_there_once, ("clips", "pairs", "runs", "regrouped")),
-    _Rule("distances are distances", distances_are_sound, ("pairs",)),
-    _Rule(
-        "linkages are dendrograms",
-        linkages_are_dendrograms,
-        ("clips", "linkage", "cuts", "runs", "regrouped"),
-    ),
-    _Rule(
-        "partitions hold every clip once",
-        partitions_hold_every_clip,
-        ("clips", "cuts", "partitions", "runs", "regrouped"),
-    ),
-    _Rule("clusters hold every clip once", clusters_hold_every_clip, ("clips", "clusters")),
-    _Rule("clusters have one reference", clusters_have_a_reference, ("clips", "clusters", "references")),
-    _Rule(
-        "distances to references are the pairs'",
-        distances_to_references_are_the_pairs,
-        ("clusters", "references", "pairs", "runs"),
-    ),
-    _Rule(
-        "labels are consistent", labels_are_consistent, ("clips", "clusters", "references", "labels", "runs")
-    ),
-    _Rule("clips are aligned once", clips_are_aligned, ("clusters", "references", "alignments", "runs")),
-    _Rule(
-        "aligned clips have their reference's frames",
-        aligned_frames_are_the_references,
-        ("clusters", "references", "aligned"),
-    ),
-    _Rule("clips have one style", clips_have_a_style, ("clusters", "references", "styles")),
+    _Rule("merged frames cover every frame", merged_frames_cover_every_frame),
+    _Rule("the run counted what is there", the_run_counted_them),
+    _Rule("every pair is there once", pairs_are_there_once),
+    _Rule("distances are distances", distances_are_sound),
+    _Rule("linkages are dendrograms", linkages_are_dendrograms),
+    _Rule("partitions hold every clip once", partitions_hold_every_clip),
+    _Rule("clusters hold every clip once", clusters_hold_every_clip),
+    _Rule("clusters have one reference", clusters_have_a_reference),
+    _Rule("distances to references are the pairs'", distances_to_references_are_the_pairs),
+    _Rule("labels are consistent", labels_are_consistent),
+    _Rule("clips are aligned once", clips_are_aligned),
+    _Rule("aligned clips have their reference's frames", aligned_frames_are_the_references),
+    _Rule("clips have one style", clips_have_a_style),
 )
 
 
@@ -146,7 +125,7 @@ def verify(store_or_url: Store | str, snapshot: str | int | None = None) -> Iter
 
 def _checked(rule: _Rule, opened: Catalog) -> Check:
     try:
-        found = rule.find(_restricted(opened, rule.reads))
+        found = rule.find(opened)
     except Exception as error:  # damaged data may raise anything, and other checks must go on
         return Check(rule.name, False, f"cannot be checked: {_reason(error)}")
     if not found.wrong:
@@ -154,14 +133,6 @@ def _checked(rule: _Rule, opened: Catalog) -> Check:
     more = len(found.wrong) - MOST_TOLD
     told = [_one_line(one) for one in found.wrong[:MOST_TOLD]] + ([f"and {more} more"] if more > 0 else [])
     return Check(rule.name, False, "; ".join(told))
-
-
-def _restricted(opened: Catalog, tables: Sequence[str] | None) -> Catalog:
-    """Give a check the tables that it reads: a view over a damaged file would spoil every other."""
-    if tables is None:
-        return opened
-    kept = {name: files for name, files in opened.snapshot.tables.items() if name in tables}
-    return Catalog(opened.store, replace(opened.snapshot, tables=kept))
 
 
 def _reason(error: Exception) -> str:

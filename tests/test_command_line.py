@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import pytest
 
 from motionary.workflows.commands.reproduce import reproduce
 from motionary.workflows.reproduce import EXPERIMENTS
+from tests.catalogs import copied
 
 
 def test_help_answers_without_the_numerical_stack():
@@ -38,7 +38,7 @@ def test_every_command_has_help(motionary, command):
 
 
 def test_run_prints_what_it_found(motionary, demo_library, demo_catalog, tmp_path):
-    catalog = shutil.copytree(demo_catalog, tmp_path / "catalog")
+    catalog = copied(demo_catalog, tmp_path)
     code, out, err = motionary(
         "run", demo_library, catalog, "--labels", demo_library / "labels.csv", "--workers", 1
     )

@@ -3,7 +3,6 @@
 import errno
 import json
 import os
-import shutil
 from collections import namedtuple
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from motionary.pipeline import compilation
 from motionary.pipeline.compilation import KernelCache, KernelCacheError
 from motionary.workflows import doctor, doctor_catalog
 from motionary.workflows.doctor import Finding, examine
+from tests.catalogs import copied
 
 SOUND_FOLDER = {"write", "rename", "lock"}
 
@@ -31,8 +31,7 @@ def everything(folder: Path) -> dict[str, int]:
 
 @pytest.fixture
 def catalog(demo_catalog, tmp_path) -> Path:
-    shutil.copytree(demo_catalog, tmp_path / "catalog")
-    return tmp_path / "catalog"
+    return Path(copied(demo_catalog, tmp_path))
 
 
 @pytest.fixture

@@ -126,12 +126,16 @@ def test_the_diff_command(changes, store, motionary):
 
 def test_the_runs_command(store, publish_rows, motionary):
     ids = ["20260102T030405Z-000001", "20260102T030406Z-000002"]
+    settings = ['{"distances": {}}', '{"distances": {"pairs": "landmarks"}}']
+    made = [
+        {"run_id": one, "version": "9", "settings": said} for one, said in zip(ids, settings, strict=True)
+    ]
     for n in (1, 2):
-        publish_rows(store, runs=[{"run_id": one, "version": "9"} for one in ids[:n]])
+        publish_rows(store, runs=made[:n])
     history = run_history(Catalog.open(store.url)).to_pylist()
-    assert [(row["run_id"], row["snapshot"], row["kept"]) for row in history] == [
-        (ids[0], "000001", True),
-        (ids[1], "000002", True),
+    assert [(row["run_id"], row["snapshot"], row["kept"], row["pairs"]) for row in history] == [
+        (ids[0], "000001", True, "all"),  # a run of before there were other routes
+        (ids[1], "000002", True, "landmarks"),
     ]
     store.delete(manifest_name("000001"))
     code, out, _ = motionary("runs", store.url, "--format", "json")

@@ -3,12 +3,12 @@
 import csv
 import io
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 
 from motionary.catalog import Catalog
+from tests.catalogs import copied
 
 WALK = "walk/walk_tired_alex_01.bvh"
 
@@ -16,7 +16,7 @@ WALK = "walk/walk_tired_alex_01.bvh"
 @pytest.fixture
 def catalog(demo_catalog, tmp_path) -> str:
     """A copy of the embedded library's catalog, to be changed."""
-    return shutil.copytree(demo_catalog, tmp_path / "catalog")
+    return copied(demo_catalog, tmp_path)
 
 
 @pytest.fixture

@@ -35,6 +35,7 @@ from motionary.pipeline.config import FeatureConfig, PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
+from tests.catalogs import copied
 
 MOST_BYTES = 10_000_000
 HOSTILE = [
@@ -349,7 +350,7 @@ def test_the_command_passes_over_damage_of_the_snapshot_before(made, some, motio
 
 
 def test_the_heading_tells_when_the_snapshot_was_made(demo_catalog, tmp_path):
-    catalog = Catalog.open(shutil.copytree(demo_catalog, tmp_path / "catalog"))
+    catalog = Catalog.open(copied(demo_catalog, tmp_path))
     clip = catalog.clips.to_arrow()["clip_id"][0].as_py()
     later = "2031-02-03T04:05:06+00:00"
     relabel(catalog.store.url, {clip: "amble"}, "a test", lambda dead: None)

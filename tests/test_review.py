@@ -21,6 +21,7 @@ from motionary.pipeline.stages.name import name
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
+from tests.catalogs import copied
 
 
 @pytest.fixture
@@ -216,8 +217,7 @@ def test_an_older_catalog_is_told_to_be_run_again(line):
 
 def test_planted_mistakes_come_first(demo_catalog, tmp_path):
     # Eight labels of eighty are exchanged for others: of the first eight of the list, how many are those?
-    shutil.copytree(demo_catalog, tmp_path / "copy")
-    catalog = Catalog.open(tmp_path / "copy")
+    catalog = Catalog.open(copied(demo_catalog, tmp_path))
     store, tables = catalog.store, catalog.snapshot.tables
     clips = catalog.clips.to_arrow()
     actions = clips["action"].to_pylist()

@@ -26,6 +26,7 @@ from motionary.pipeline.stages.columns import condensed, condensed_places
 from motionary.pipeline.writers import write_bvh
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
+from tests.catalogs import copied
 
 METRICS = ("dtw", "b_dtw", "weighted", "fuzzy")
 
@@ -206,7 +207,7 @@ def test_a_preset_weighs_joints(demo_catalog):
 
 
 def test_only_the_files_of_its_side_are_opened(fuzzy_catalog, tmp_path):
-    copy, held = Path(shutil.copytree(fuzzy_catalog, tmp_path / "catalog")), []
+    copy, held = Path(copied(fuzzy_catalog, tmp_path)), []
     with Catalog.open(fuzzy_catalog) as whole:
         clip_id = clip_ids_of(whole)[11]
         expected = answered(whole.similar(clip_id))

@@ -2,7 +2,6 @@
 
 import multiprocessing
 import os
-import shutil
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,6 +13,7 @@ from motionary.catalog.verify import verify
 from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
+from tests.catalogs import copied
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def catalog(demo_catalog):
 
 def test_a_selection_that_writes_is_refused(demo_catalog, tmp_path):
     """DuckDB calls `with x as (copy ...)` a selection, and may write where it may read."""
-    catalog = Path(shutil.copytree(demo_catalog, tmp_path / "catalog"))
+    catalog = Path(copied(demo_catalog, tmp_path))
     before = (catalog / "CURRENT").read_bytes()
     for inner in (
         f"copy (select '999999') to '{catalog / 'CURRENT'}' (format csv, header false)",
@@ -57,7 +57,7 @@ def test_an_answer_keeps_its_order(catalog):
 
 @pytest.mark.parametrize("folder", ["label=walk", "clip_id=5/weighted=0.5"])
 def test_the_catalogs_place_changes_no_answer(demo_catalog, catalog, tmp_path, folder):
-    elsewhere = Catalog.open(shutil.copytree(demo_catalog, tmp_path / folder / "catalog"))
+    elsewhere = Catalog.open(copied(demo_catalog, tmp_path / folder))
     query = "select label, count(*) as n from clusters group by label order by label"
     assert elsewhere.sql(query).equals(catalog.sql(query))
     clip_id = catalog.clips.to_arrow()["clip_id"][0].as_py()

@@ -17,6 +17,7 @@ import pytest
 from motionary.catalog.schema import SCHEMAS
 from motionary.catalog.store import Store
 from motionary.catalog.verify import _RULES, verify
+from tests.catalogs import copied
 
 AS_WRITTEN = "files are as they were written"
 READS = "plain pyarrow reads every file"
@@ -42,8 +43,7 @@ class Damaged:
     """A copy of a catalog that can be rewritten such that its manifest agrees with what is there."""
 
     def __init__(self, url: str, folder: Path) -> None:
-        shutil.copytree(url, folder)
-        self.folder = folder
+        self.folder = folder = Path(copied(url, folder))
         self.store = Store(str(folder))
         current = (folder / "CURRENT").read_text().strip()
         self.manifest_file = folder / "snapshots" / f"{current}.json"
@@ -75,7 +75,7 @@ class Damaged:
 
 @pytest.fixture
 def damaged(demo_catalog, tmp_path) -> Damaged:
-    return Damaged(demo_catalog, tmp_path / "catalog")
+    return Damaged(demo_catalog, tmp_path)
 
 
 def put(table: pa.Table, column: str, values: object) -> pa.Table:

@@ -1,7 +1,6 @@
 """The application on a real server of this machine, and catalogs to be changed."""
 
 import csv
-import shutil
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -18,6 +17,7 @@ from motionary.pipeline.config import PipelineConfig
 from motionary.workflows.browse import LabelEditor
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
+from tests.catalogs import copied
 
 
 @contextmanager
@@ -46,11 +46,6 @@ def served(
 def editor_of(url: str, user: str = "ada") -> LabelEditor:
     """Return what publishes labels, as the command has it."""
     return LabelEditor(url, user, lambda dead: None)
-
-
-def copied(catalog: str, folder: Path) -> str:
-    """Copy a catalog, to be changed; without the leases of who reads it meanwhile, which come and go."""
-    return str(shutil.copytree(catalog, folder / "catalog", ignore=shutil.ignore_patterns("leases")))
 
 
 def with_mistakes(library: Path, catalog: str, folder: Path, progress: Callable) -> str:

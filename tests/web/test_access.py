@@ -13,7 +13,8 @@ from motionary.catalog import Catalog
 from motionary.catalog.web import data, drop, pages
 from motionary.catalog.web.access import Guard
 from motionary.catalog.web.app import create_app
-from tests.web.serving import copied, editor_of, served, tree
+from tests.catalogs import copied
+from tests.web.serving import editor_of, served, tree
 
 TOKEN = "a-token-that-nobody-guesses"
 CLIP = "walk/walk_tired_alex_01.bvh"

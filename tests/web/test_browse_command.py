@@ -16,7 +16,7 @@ import pytest
 from motionary.catalog import Catalog
 from motionary.workflows.browse import TOKEN, find_token, take_place
 from motionary.workflows.errors import UserError
-from tests.web.serving import copied
+from tests.catalogs import copied
 
 PROGRAM = [sys.executable, "-c", "from motionary.workflows.cli import main; main()", "browse"]
 GIVEN = "a-token-that-nobody-guesses"

@@ -15,7 +15,8 @@ from motionary.catalog.store import Store
 from motionary.catalog.web.desk import Desk, Edit, Relabel, Undo
 from motionary.catalog.writer_lock import the_only_writer
 from motionary.workflows.relabel import relabel
-from tests.web.serving import copied, editor_of, served
+from tests.catalogs import copied
+from tests.web.serving import editor_of, served
 
 WALK, RUN, JUMP = "walk/walk_tired_alex_01.bvh", "run/run_tired_bea_01.bvh", "jump/jump_neutral_emil_02.bvh"
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from motionary.catalog.web import chart_data, opened
 from motionary.catalog.web.opened import CatalogGone, Kept, Opened
 from motionary.workflows.relabel import relabel
-from tests.web.serving import copied, editor_of, served
+from tests.catalogs import copied
+from tests.web.serving import editor_of, served
 
 WALK = "walk/walk_tired_alex_01.bvh"
 

@@ -19,8 +19,9 @@ from motionary.catalog.web.opened import CatalogGone, Opened
 from motionary.catalog.web.search import PAGE, page_of
 from motionary.pipeline.canonical import CANONICAL_JOINTS
 from motionary.workflows.relabel import relabel
+from tests.catalogs import copied
 from tests.web.hostile import LABELS, NAMES, hostile_catalog
-from tests.web.serving import copied, editor_of, served
+from tests.web.serving import editor_of, served
 
 UNSHOWN = ("customdata", "ids", "legendgroup")  # of a trace of Plotly
 WALK, RUN = "walk/walk_tired_alex_01.bvh", "run/run_tired_bea_01.bvh"

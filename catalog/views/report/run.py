@@ -83,11 +83,23 @@ def _runs(catalog: Catalog) -> str:
             row["quarantined"],
             row["clips_read"],
             row["pairs_computed"],
+            row["pairs"],
             "yes" if row["kept"] else "vacuumed",
         ]
         for row in reversed(run_history(catalog)[-_MOST_RUNS:].to_pylist())
     ]
-    columns = ["run", "began, UTC", "seconds", "clips", "clusters", "quarantined", "read", "compared", "kept"]
+    columns = [
+        "run",
+        "began, UTC",
+        "seconds",
+        "clips",
+        "clusters",
+        "quarantined",
+        "read",
+        "compared",
+        "of pairs",
+        "kept",
+    ]
     return table(columns, rows)
 
 
