@@ -7,6 +7,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The peers of the benchmarks: what they pin would drag down what we stand on.
 PEERS := .venv-peers
+# Python compiles what it imports; to compile all that is installed takes pip longer than to install it.
+PIP_INSTALL := pip install --quiet --disable-pip-version-check --no-compile
 # Tests go to a process more than there are cores, for some wait; a file of tests stays together, for what it
 # prepares serves all of it.
 SHARED_OUT := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadfile
@@ -32,38 +34,38 @@ demo: $(VENV)/installed
 	@echo "== The main job on the embedded library of made-up motions, in motionary-demo/"
 	$(BIN)/motionary demo motionary-demo
 
-test: $(VENV)/installed
+test: $(VENV)/installed $(VENV)/tools
 	@echo "== The tests, without those marked slow"
 	$(BIN)/python -m pytest $(SHARED_OUT) -m "not slow"
 
-test-all: $(VENV)/installed
+test-all: $(VENV)/installed $(VENV)/tools
 	@echo "== All tests"
 	$(BIN)/python -m pytest $(SHARED_OUT)
 
-bench: $(VENV)/installed $(PEERS)/environment
+bench: $(VENV)/installed $(VENV)/tools $(PEERS)/environment
 	@echo "== The distances beside dtaidistance, aeon and tslearn: some minutes, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks --peers $(PEERS)/bin/python --json motionary-bench/bench.json
 	@$(MAKE) --no-print-directory bench-alignment bench-ask
 
-bench-alignment: $(VENV)/installed
+bench-alignment: $(VENV)/installed $(VENV)/tools
 	@echo "== The alignment beside a naive recursion, and on real clips: a minute or two, best on a quiet machine"
 	$(BIN)/python -m tests.benchmarks.alignment --json motionary-bench/alignment.json
 
-bench-ask: $(VENV)/installed
+bench-ask: $(VENV)/installed $(VENV)/tools
 	@echo "== Questions to catalogs of 300 to 10,000 embedded clips; making them takes a quarter of an hour, the first time"
 	$(BIN)/python -m tests.benchmarks.ask --json motionary-bench/ask.json
 
-scale: $(VENV)/installed
+scale: $(VENV)/installed $(VENV)/tools
 	@echo "== Libraries of 300, 1,000, 3,000 and 10,000 embedded clips, run and measured: half an hour"
 	$(BIN)/python -m tests.benchmarks.scale --json motionary-bench/scale.json
 
-torture: $(VENV)/installed
+torture: $(VENV)/installed $(VENV)/tools
 	@echo "== Damaged files, killed runs, readers under writing, full disks: an hour or more"
 	$(BIN)/python -m tests.torture
 
 docs: motionary-docs/built
 
-lint: $(VENV)/installed
+lint: $(VENV)/installed $(VENV)/tools
 	@echo "== Style, types, direction of imports"
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -78,15 +80,21 @@ $(VENV)/environment: constraints.txt pyproject.toml
 	@test -n "$(PYTHON)" || { echo "motionary needs Python 3.11 to 3.13; name one: make PYTHON=python3.12" >&2; exit 1; }
 	@echo "== Making the environment $(VENV) with $$($(PYTHON) --version)"
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt pip setuptools wheel
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt ".[test,lint]"
+	$(BIN)/python -m $(PIP_INSTALL) -c constraints.txt pip setuptools wheel
+	$(BIN)/python -m $(PIP_INSTALL) --no-build-isolation -c constraints.txt ".[all]"
+	@touch $@
+
+# By name, so that the installation stays what it is.
+$(VENV)/tools: $(VENV)/environment | $(VENV)/installed
+	@echo "== Adding the tools for tests, docs and style to $(VENV)"
+	$(BIN)/python -m $(PIP_INSTALL) -c constraints.txt "motionary[test,lint]"
 	@touch $@
 
 $(PEERS)/environment: tests/benchmarks/constraints.txt
 	@test -n "$(PYTHON)" || { echo "motionary needs Python 3.11 to 3.13; name one: make PYTHON=python3.12" >&2; exit 1; }
 	@echo "== Making the peers' environment $(PEERS)"
 	$(PYTHON) -m venv --clear $(PEERS)
-	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c tests/benchmarks/constraints.txt \
+	$(PEERS)/bin/python -m $(PIP_INSTALL) -c tests/benchmarks/constraints.txt \
 		aeon dtaidistance tslearn
 	@touch $@
 
@@ -95,11 +103,11 @@ $(PEERS)/environment: tests/benchmarks/constraints.txt
 $(VENV)/installed: $(VENV)/environment $(SOURCES)
 	@echo "== Installing motionary into $(VENV)"
 	@rm -rf build $(VENV)/lib/python*/site-packages/motionary
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
+	$(BIN)/python -m $(PIP_INSTALL) --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build
 	@touch $@
 
-motionary-docs/built: $(VENV)/installed $(PAGES)
+motionary-docs/built: $(VENV)/installed $(VENV)/tools $(PAGES)
 	@echo "== The documentation site, in motionary-docs/: some minutes"
 	$(BIN)/python -m motionary.workflows.documentation motionary-docs
 	@touch $@
