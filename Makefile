@@ -7,7 +7,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The peers of the benchmarks: what they pin would drag down what we stand on.
 PEERS := .venv-peers
-# Python compiles what it imports; to compile all that is installed takes pip longer than to install it.
+# Python compiles what it imports and keeps that, whatever the environment says; to compile all that is
+# installed takes pip longer than to install it.
+export PYTHONDONTWRITEBYTECODE :=
 PIP_INSTALL := pip install --quiet --disable-pip-version-check --no-compile
 # Tests go to a process more than there are cores, for some wait; a file of tests stays together, for what it
 # prepares serves all of it.
