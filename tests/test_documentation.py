@@ -22,13 +22,14 @@ from motionary.catalog.schema import PUBLISHED, SCHEMAS
 from motionary.workflows.cli import app
 from motionary.workflows.documentation import links
 from motionary.workflows.documentation.command_text import commands, commands_text
+from motionary.workflows.documentation.contact_sheet import contact_sheet
 from motionary.workflows.documentation.making import asked, made, makers
 from motionary.workflows.documentation.markdown import plain
 from motionary.workflows.documentation.pictures import PICTURES, picture_text
 from motionary.workflows.documentation.python_text import python_text
 from motionary.workflows.documentation.rendered_notebooks import kept
 from motionary.workflows.documentation.site import build_site
-from motionary.workflows.documentation.staging import pages, readmes
+from motionary.workflows.documentation.staging import HERE, pages, readmes
 from motionary.workflows.documentation.table_text import tables_text
 from motionary.workflows.errors import UserError
 
@@ -187,6 +188,16 @@ def test_the_links_of_a_readme_hold_on_the_site_too(readme):
         assert on_site in {*shown, *notebooks, *readmes(ROOT)}, link
 
 
+def test_the_readmes_picture_is_of_the_embedded_library(demo_catalog):
+    kept = (ROOT / HERE / "static" / "clusters.svg").read_text(encoding="utf-8")
+    with Catalog.open(demo_catalog) as catalog:
+        drawn = contact_sheet(catalog)
+    number = r"-?\d+(?:\.\d+)?"
+    assert re.sub(number, "#", kept) == re.sub(number, "#", drawn), "draw it anew: see contact_sheet.py"
+    places = [[float(one) for one in re.findall(number, text)] for text in (kept, drawn)]
+    np.testing.assert_allclose(*places, atol=0.11, err_msg="draw it anew: see contact_sheet.py")
+
+
 def test_a_link_that_leads_nowhere_is_refused():
     with pytest.raises(FileNotFoundError, match="README.md links to gone.md, and there is no gone.md"):
         links.rewritten("[a](gone.md)", "README.md", ROOT)
@@ -198,6 +209,8 @@ def test_links_to_code_lead_to_a_page_that_shows_it():
         "[a](config.py.md) [b](readers/README.md) [c](writers/__init__.py.md) [d](#here) "
         "[e](https://example.org/x.py)"
     )
+    picture = f"![a]({HERE}/static/clusters.svg)"
+    assert links.rewritten(picture, "README.md", ROOT) == picture
     shown = links.source_page("pipeline/config.py", ROOT)
     assert (ROOT / "pipeline" / "config.py").read_text().rstrip() in shown
 

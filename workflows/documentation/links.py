@@ -1,7 +1,8 @@
 """Links of a README lead to files of the repository; on the site each of them is a page.
 
-A README, a notebook and a page are pages already. Another file that is linked to gets a page of its own that
-shows its text, and a folder means its README, or else what its package says of itself.
+A README, a notebook and a page are pages already, and a picture stays one. Another file that is linked to
+gets a page of its own that shows its text, and a folder means its README, or else what its package says of
+itself.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 
 _LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)#\s]+)")
 _PAGES = (".md", ".ipynb")
+PICTURE = ".svg"
 _LANGUAGES = {".py": "python", ".toml": "toml", ".yaml": "yaml", ".yml": "yaml"}
 
 
@@ -35,14 +37,13 @@ def rewritten(text: str, at: str, repository: Path) -> str:
 
     def page(found: re.Match[str]) -> str:
         source = _linked(found[1], at, repository)
-        shown = source if source.endswith(_PAGES) else page_of(source)
-        return posixpath.relpath(shown, posixpath.dirname(at) or ".")
+        return posixpath.relpath(page_of(source), posixpath.dirname(at) or ".")
 
     return _LINK.sub(page, text)
 
 
 def linked_sources(text: str, at: str, repository: Path) -> Iterator[str]:
-    """List the files that a README links to and that need pages of their own, by their paths."""
+    """List the files that a README links to, or shows, and that are no pages, by their paths."""
     for link in _LINK.findall(text):
         source = _linked(link, at, repository)
         if not source.endswith(_PAGES):
@@ -50,8 +51,8 @@ def linked_sources(text: str, at: str, repository: Path) -> Iterator[str]:
 
 
 def page_of(source: str) -> str:
-    """Return the path of the page that shows a file."""
-    return f"{source}.md"
+    """Return the path of the page that shows a file, which may be its own."""
+    return source if source.endswith((*_PAGES, PICTURE)) else f"{source}.md"
 
 
 def source_page(source: str, repository: Path) -> str:

@@ -1,7 +1,7 @@
 """The sources that Sphinx gets: a tree like the repository's, so that the READMEs' links hold on the site.
 
-`pages/` lies at the root of it, READMEs lie where they lie in the repository, and what these link to beside
-READMEs gets pages.
+`pages/` lies at the root of it, READMEs and their pictures lie where they lie in the repository, and what
+else these link to gets pages.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ def stage(repository: Path, sources: Path, catalog: Catalog) -> None:
         _write(sources / readme, links.rewritten(text, readme, repository))
         shown |= set(links.linked_sources(text, readme, repository))
     for source in sorted(shown):
-        _write(sources / links.page_of(source), links.source_page(source, repository))
+        if source.endswith(links.PICTURE):
+            _copy(repository / source, sources / source)
+        else:
+            _write(sources / links.page_of(source), links.source_page(source, repository))
     shutil.copy(repository / HERE / "conf.py", sources)
     shutil.copytree(repository / HERE / "static", sources / "static")
     shutil.copy(repository / "catalog" / "web" / "static" / "icon.svg", sources / "static")
@@ -59,6 +62,11 @@ def readmes(repository: Path) -> list[str]:
     """List the READMEs of the repository, by their paths in it."""
     found = [file for top in README_FOLDERS for file in (repository / top).rglob("README.md")]
     return ["README.md", *sorted(file.relative_to(repository).as_posix() for file in found)]
+
+
+def _copy(file: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy(file, to)
 
 
 def _write(file: Path, text: str) -> None:
