@@ -395,7 +395,7 @@ class Catalog:
 
         Raises
         ------
-        UnknownClip
+        CatalogError
             There is none of a name; the message tells the nearest names.
         """
         known = self.keep("clips", lambda: dict.fromkeys(self.clips.to_arrow()["clip_id"].to_pylist()))

@@ -242,6 +242,17 @@ def test_a_rendered_notebook_wants_neither_kernel_nor_network():
     assert said.text == "said"
 
 
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning(tmp_path):
+    build_site(ROOT, tmp_path / "site")
+    assert (tmp_path / "site" / "README.html").is_file()
+
+
+def test_every_readme_has_its_place_on_the_site():
+    entries = re.findall(r"^(?:.*<)?([\w/]*README)>?$", PAGES["index.md"], re.M)
+    assert sorted(f"{one}.md" for one in entries) == sorted(readmes(ROOT))
+
+
 def test_a_folder_of_something_else_is_not_replaced(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     with pytest.raises(UserError, match="name another folder"):

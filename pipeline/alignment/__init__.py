@@ -24,6 +24,7 @@ from motionary.pipeline.alignment.procrustes import (
     procrustes_dtw,
     procrustes_motion_warping,
 )
+from motionary.pipeline.alignment.quadratic_programme import UnsolvedError
 from motionary.pipeline.alignment.reference import (
     ReferenceScores,
     score_references,
@@ -54,6 +55,7 @@ __all__ = [
     "ProcrustesWarping",
     "ReferenceScores",
     "SakoeChiba",
+    "UnsolvedError",
     "Warp",
     "adaptive_dtw",
     "canonical_time_warping",

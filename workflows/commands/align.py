@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = {
     "align": (
-        "motionary align walk.bvh other.bvh  # how well CoTW brings the first into the other's time",
+        "motionary align walk.bvh other.bvh  # how well CoTW brings one into the time of the other",
         "motionary align CATALOG A B --method dtw --method cotw --plot out.html",
         "motionary align CATALOG A B --method all --format json",
         "motionary align A.bvh B.bvh --plot out.html --joint left_wrist",
