@@ -17,6 +17,7 @@ A mark in each cache folder says that every kernel of these very sources is ther
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import signal
 import sqlite3
@@ -97,8 +98,12 @@ def compile_kernels(announce: Callable[[], object]) -> None:
         return
     announce()
     done = subprocess.run(
-        [sys.executable, "-m", "motionary.pipeline.compilation"], capture_output=True, text=True, check=False
-    )
+        # Modules are looked for where this process found them: a folder `motionary` where the user stands,
+        # such as a clone, holds others.
+        [sys.executable, "-P", "-m", "motionary.pipeline.compilation"],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(one or str(Path.cwd()) for one in sys.path)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     if done.returncode == _NO_CACHE:
         raise KernelCacheError(done.stderr.strip())
     if done.returncode:

@@ -37,6 +37,36 @@ def test_every_command_has_help(motionary, command):
     assert "Usage: motionary" in out
 
 
+@pytest.mark.parametrize(
+    ("file", "options", "expected"),
+    [
+        ("[clusters]\nthreshold = 0.3", ("--kappa", 3), (3, None, "all", None)),
+        ("[clusters]\nn_clusters = 3", ("--mu", 0.3), (None, 0.3, "all", None)),
+        (
+            '[clusters]\nlandmarks = 9\n[distances]\npairs = "landmarks"',
+            ("--primary", "complete", "--mu", 0.3, "--prune"),
+            (None, 0.3, "pruned", None),
+        ),
+        (
+            '[clusters]\nprimary = "complete"\nthreshold = 0.3\n[distances]\npairs = "pruned"',
+            ("--landmarks", 9),
+            (None, 0.3, "landmarks", 9),
+        ),
+    ],
+)
+def test_an_option_wins_over_what_excludes_it_in_the_file(
+    motionary, demo_library, tmp_path, monkeypatch, file, options, expected
+):
+    jobs = []
+    monkeypatch.setattr("motionary.workflows.commands.run._run", lambda job, as_json: jobs.append(job))
+    (tmp_path / "motionary.toml").write_text(file)
+    config = ("--config", tmp_path / "motionary.toml")
+    code, _, err = motionary("run", demo_library, tmp_path / "out", *config, *options)
+    assert code == 0, err
+    clusters, pairs = jobs[0].config.clusters, jobs[0].config.distances.pairs
+    assert (clusters.n_clusters, clusters.threshold, pairs, clusters.landmarks) == expected
+
+
 def test_run_prints_what_it_found(motionary, demo_library, demo_catalog, tmp_path):
     catalog = copied(demo_catalog, tmp_path)
     code, out, err = motionary(

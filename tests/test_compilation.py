@@ -214,6 +214,26 @@ def test_a_change_in_any_module_beside_a_kernel_counts(tmp_path, monkeypatch):
     assert digest() != before
 
 
+def test_what_this_process_has_loaded_is_compiled_whatever_lies_where_the_user_stands(tmp_path, monkeypatch):
+    (tmp_path / "motionary" / "pipeline").mkdir(parents=True)
+    (tmp_path / "motionary" / "pipeline" / "__init__.py").touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(compilation, "_compiled", lambda folders: False)
+    found = []
+
+    def ask(command: list[str], **options):
+        where = "import motionary.pipeline; print(motionary.pipeline.__file__)"
+        done = subprocess.CompletedProcess(command, 0)
+        assert command[-2:] == ["-m", "motionary.pipeline.compilation"]
+        found.append(usual([*command[:-2], "-c", where], **options).stdout.strip())
+        return done
+
+    usual = subprocess.run
+    monkeypatch.setattr(compilation.subprocess, "run", ask)
+    compilation.compile_kernels(lambda: None)
+    assert found == [str(Path(compilation.__file__).parent / "__init__.py")]
+
+
 @pytest.mark.slow
 def test_two_runs_at_once_compile_once_and_older_code_is_replaced(cold, tmp_path):
     cache = tmp_path / "cache"

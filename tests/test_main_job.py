@@ -1,5 +1,6 @@
 """The main job: nothing lost, nothing recomputed, the same bytes however it is run."""
 
+import errno
 import json
 import shutil
 from pathlib import Path
@@ -12,8 +13,11 @@ import pytest
 
 from motionary.catalog import Catalog
 from motionary.catalog.schema import PUBLISHED
+from motionary.catalog.snapshot import OVERVIEW
+from motionary.catalog.store import Store
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
 from motionary.pipeline.stages import ingest
+from motionary.workflows.errors import UserError
 from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 
@@ -43,6 +47,25 @@ def few(demo_library, tmp_path) -> Path:
 
 def job(library: Path, catalog: Path, *, tile: int = 3, **options) -> Job:
     return Job([str(library)], str(catalog), PipelineConfig(distances=DistanceConfig(tile=tile)), **options)
+
+
+def test_a_page_that_finds_no_room_is_told_with_what_is_published(
+    few, tmp_path, monkeypatch, silent_progress
+):
+    usual = Store.write
+
+    def full(store: Store, name: str, content) -> None:
+        if name == OVERVIEW:
+            raise OSError(errno.ENOSPC, "No space left on device", name)
+        usual(store, name, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "write", full)
+        with pytest.raises(UserError, match=r"snapshot 000001 is published, but its page is not: .*space"):
+            run(job(few, tmp_path / "out"), silent_progress)
+    assert len(Catalog.open(tmp_path / "out").clips) == 8
+    run(job(few, tmp_path / "out"), silent_progress)
+    assert (tmp_path / "out" / OVERVIEW).is_file()
 
 
 def test_every_table_is_there_with_its_rows(demo_catalog, demo_library):
@@ -288,6 +311,7 @@ def test_a_clip_that_changes_under_the_run_is_set_aside(few, tmp_path, silent_pr
     monkeypatch.setattr(ingest, "read_motion", meanwhile)
     catalog = run(job(few, tmp_path / "out"), silent_progress).catalog
     (row,) = catalog.quarantine.to_arrow().to_pylist()
-    assert (row["reason"], row["mend"]) == ("it changed while the run was reading it", "run again")
+    assert row["reason"] == "it is not what it was when the run began"
+    assert row["mend"].startswith("run again")
     monkeypatch.undo()
     assert len(run(job(few, tmp_path / "out"), silent_progress).catalog.clips) == 8

@@ -1,5 +1,6 @@
 """What a run will take: sizes, memory and its refusal, the model of time, and the command."""
 
+import errno
 import json
 import os
 import signal
@@ -64,6 +65,11 @@ def test_sizes_and_times_are_written_shortly():
     assert [time_text(one) for one in (3, 150, 7300, 200 * 3600)] == ["3 s", "2 min", "2.0 h", "8.3 days"]
 
 
+def test_a_size_that_is_needed_is_rounded_up():
+    sizes = (377_000_000, 377_400_000, 1_310_000_000, 9_990_000)
+    assert [size_text(size, up=True) for size in sizes] == ["377 MB", "378 MB", "1.4 GB", "10.0 MB"]
+
+
 def amounts(clips: int, a_clip: int = 80_000) -> Amounts:
     side = min(clips, 1 << max(5, int(np.log2(6 * clips**0.5))))
     return Amounts(
@@ -102,7 +108,7 @@ def test_a_refusal_tells_both_numbers_what_needs_it_and_a_mend_that_mends():
     with pytest.raises(UserError) as told:
         refuse(need)
     message = str(told.value)
-    assert size_text(need.bytes) in message
+    assert size_text(need.bytes, up=True) in message
     assert "2.0 GB is allowed" in message
     assert need.largest in message
     fewer = int(message.split("--workers ")[1].split(maxsplit=1)[0])
@@ -138,6 +144,21 @@ def test_a_run_for_which_a_disk_is_too_small_writes_nothing(
         run(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig()), silent_progress)
     assert told in str(refused.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_the_overview_page_needs_room_where_nothing_else_does(demo_library, tmp_path):
+    ready = prepare(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig()))
+    nothing = replace(ready.plan, to_read=0, to_store=0)
+    assert needed_bytes(ready.amounts, nothing) > 4.9e6
+
+
+def test_a_plan_without_room_for_its_trial_names_the_folder(demo_library, tmp_path, monkeypatch):
+    def full(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("motionary.workflows.costs.calibration.run_task", full)
+    with pytest.raises(UserError, match="set TMPDIR"):
+        calibrate(prepare(Job([str(demo_library)], str(tmp_path / "out"), PipelineConfig())).graph)
 
 
 @pytest.mark.parametrize("full", ["catalog", "temporary"])

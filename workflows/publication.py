@@ -16,6 +16,7 @@ from motionary.catalog.snapshot import OVERVIEW, Snapshot, next_snapshot_id, pub
 from motionary.catalog.store import Store
 from motionary.catalog.views.overview import overview_page
 from motionary.pipeline.task import MAKES, TaskReport
+from motionary.workflows.errors import UserError
 from motionary.workflows.preparation import Prepared
 from motionary.workflows.versions import versions
 
@@ -41,6 +42,11 @@ def publish_run(
         When it began.
     check : callable
         Asked before anything is published.
+
+    Raises
+    ------
+    UserError
+        The page could not be written. The snapshot is published then.
     """
     store, before = ready.store, ready.before
     snapshot_id = next_snapshot_id(store)
@@ -71,8 +77,18 @@ def publish_run(
     catalog = Catalog(store, snapshot)
     check(Catalog(store, before) if before else None, catalog)
     publish(store, snapshot, before)
-    store.write(OVERVIEW, overview_page(catalog).encode())
+    _write_overview(catalog)
     return Catalog.open(store.url)
+
+
+def _write_overview(catalog: Catalog) -> None:
+    try:
+        catalog.store.write(OVERVIEW, overview_page(catalog).encode())
+    except OSError as error:
+        raise UserError(
+            f"snapshot {catalog.snapshot.snapshot_id} is published, but its page is not: "
+            f"{catalog.store.full_path(OVERVIEW)}: {error.strerror or error}; mend that and run again"
+        ) from error
 
 
 def _record(

@@ -37,7 +37,7 @@ class Workplace:
     Parameters
     ----------
     files : tuple of str
-        One of every folder of the library.
+        One of every library.
     store : Store
         The catalog; its folder holds `token`.
     token : str

@@ -96,7 +96,10 @@ def _ingest_one(source: Source, config: PipelineConfig) -> dict[str, pa.Table]:
     own = config.features.conventions
     motion = read_motion(source.files[0], skeleton=skeleton, conventions=own, **asdict(config.read))
     if digest_of(source.files) != source.digest:
-        raise ReadError(source.files[0], None, "it changed while the run was reading it", "run again")
+        raise ReadError(
+            source.files[0], None, "it is not what it was when the run began",
+            "run again, and where workers run elsewhere let them see the same files",
+        )  # fmt: skip
     features = frame_features(motion, config.features)
     return {
         "ingested": _ingested(source, motion, features),

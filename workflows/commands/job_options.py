@@ -48,12 +48,18 @@ def job_of(
         "label_column": label_column,
     }  # fmt: skip
     options["clusters"] |= {name: value for name, value in given.items() if value is not None}
+    # Of two that exclude each other the one given here wins over one of the file or the environment.
+    if clusters is not None:
+        options["clusters"]["threshold"] = None
+    if threshold is not None:
+        options["clusters"]["n_clusters"] = None
     if not travel:
         options["features"]["travel_time"] = 0.0
     if prune and landmarks is not None:
         raise typer.BadParameter("give --prune or --landmarks, not both")
     if prune:
         options["distances"] = {"pairs": "pruned"}
+        options["clusters"]["landmarks"] = None
     if landmarks is not None:
         options["distances"] = {"pairs": "landmarks"}
         options["clusters"]["landmarks"] = _landmarks(landmarks)

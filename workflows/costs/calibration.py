@@ -6,11 +6,12 @@ timed apart, see `motionary.workflows.costs.made_up`.
 
 from __future__ import annotations
 
+import errno
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pyarrow as pa
@@ -126,15 +127,23 @@ def calibrate(graph: LibraryGraph, compiling: Callable[[], object] = lambda: Non
     Raises
     ------
     UserError
-        Of the sample, fewer than two clips can be read.
+        Of the sample, fewer than two clips can be read; or there is no room for temporary files.
     """
     compile_kernels(compiling)
     start = time.perf_counter()
-    with TemporaryDirectory(prefix="motionary-plan-") as folder, threadpool_limits(1):
-        run = _SampleRun(graph, Store(folder))
-        run.warm_up()
-        starting = time.perf_counter() - start
-        return _measured(run, run.whole(), start, starting)
+    try:
+        with tempfile.TemporaryDirectory(prefix="motionary-plan-") as folder, threadpool_limits(1):
+            run = _SampleRun(graph, Store(folder))
+            run.warm_up()
+            starting = time.perf_counter() - start
+            return _measured(run, run.whole(), start, starting)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise UserError(
+            f"there is no room in {tempfile.gettempdir()} to try a sample of the library; make room there, "
+            "or set TMPDIR to a folder of a larger disk"
+        ) from error
 
 
 class _SampleRun:

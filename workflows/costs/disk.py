@@ -19,11 +19,14 @@ from motionary.workflows.plan import Plan
 # Bytes: `motionary demo --clips 300` writes 1.7 MB of 44,850 pairs and 14 MB of 22 MB of BVH.
 _OF_PAIR, _OF_BYTE = 40.0, 0.65
 
+PAGE = 5e6
+"""Bytes of the overview page, which every run writes anew: nearly all of it are plotly's scripts."""
+
 
 def needed_bytes(amounts: Amounts, plan: Plan) -> int:
-    """Say about how much a run writes: of the clips that are read, and of the pairs that are kept."""
+    """Say about how much a run writes: of the clips that are read, of the pairs that are kept, the page."""
     read = amounts.library * plan.to_read / max(amounts.clips, 1)
-    return round(_OF_BYTE * read + _OF_PAIR * plan.to_store * (not amounts.pruned))
+    return round(_OF_BYTE * read + _OF_PAIR * plan.to_store * (not amounts.pruned) + PAGE)
 
 
 def refuse_small_disks(store: Store, amounts: Amounts, plan: Plan, need: Need) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from motionary.workflows.costs.disk import PAGE
 from motionary.workflows.costs.memory import Need
 from motionary.workflows.costs.sizes import needed_text, size_text, time_text
 from motionary.workflows.plan import Plan
@@ -129,7 +130,7 @@ class Foretold:
                 "",
                 f"memory: {needed_text(self.memory.bytes, self.memory.allowed)}, most of it beside the "
                 f"processes for {self.memory.largest}; {self._scratch()}",
-                f"disk: {size_text(self.disk)}{free}",
+                f"disk: {size_text(self.disk + PAGE)}{free}, the overview page with it",
                 f"from {self.sampled} clips that were tried in {self.calibration:.0f} s on this machine; "
                 "workers are taken for as fast as its cores",
             ]

@@ -38,6 +38,7 @@ _NAMED = 600.0  # a clip in a task over the whole library: what it is called, it
 _POSED = 0.3  # a byte of the library, as poses at 30 frames a second: 309 bytes a frame, see stages.represent
 _STYLED, _AVERAGED, _ANALYSED = 2.6e3, 13e3, 62e3  # a clip of some 31 joints: see stages.style
 _LARGEST_CLUSTER = 0.25  # of all clips: what is represented and styled cannot be divided further
+_PAGE = 80e6  # the overview page: 61 MB of 80 clips, 53 of 10,000, in a process that has imported all else
 _SCRATCH = 16.0  # a pair, in temporary files while it is clustered: see clustering.linkage and mapped
 
 _MERGED = 0.1  # a byte of the library, merged frames of clips that are refined: .06 of embedded ones
@@ -45,8 +46,8 @@ _MERGED = 0.1  # a byte of the library, merged frames of clips that are refined:
 _SLACK = 64e6
 """Bytes left beside the room of a task: what a part takes while it is read."""
 
-ONE_TASK = ("cluster", "stand", "regroup", "identify", "represent", "style", "name")
-"""Stages that are one task, over the whole library."""
+ONE_TASK = ("cluster", "stand", "regroup", "identify", "represent", "style", "name", "publish")
+"""Stages that are one task, over the whole library, and what comes after them."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +135,9 @@ def refuse(need: Need) -> None:
     """
     if need.fits or need.allowed is None:
         return
+    needed, allowed = size_text(need.bytes, up=True), size_text(need.allowed)
     raise UserError(
-        f"the run needs about {size_text(need.bytes)} of memory and {size_text(need.allowed)} is allowed: "
+        f"the run needs about {needed} of memory and {allowed} is allowed: "
         f"{_processes_text(need)} {size_text(need.base)}, and {_largest_text(need)} "
         f"{size_text(need.bytes - need.base)}; {' or '.join(_mends(need))}"
     )
@@ -163,6 +165,7 @@ def _tasks(amounts: Amounts, room: int) -> dict[str, float]:
         "name": _NAMED * clips,
         "align": read + _NAMED * clips,
         "style": _STYLED * clips + max(min(averages, room), undivided[1]),
+        "publish": _PAGE,
     }
     if amounts.landmarks is not None:
         square = _LINKED * amounts.landmarks**2

@@ -26,11 +26,14 @@ def parse_size(text: str) -> int:
     return size
 
 
-def size_text(size: float) -> str:
-    """Write a size with two digits or more: 2.1 GB."""
+def size_text(size: float, up: bool = False) -> str:
+    """Write a size with two digits or more: 2.1 GB; rounded up where that much is needed."""
     for unit, bytes_ in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if size >= bytes_:
-            return f"{size / bytes_:.1f} {unit}" if size < 10 * bytes_ else f"{size / bytes_:.0f} {unit}"
+            digits = 1 if size < 10 * bytes_ else 0
+            shown = size / bytes_
+            shown = math.ceil(shown * 10**digits) / 10**digits if up else shown
+            return f"{shown:.{digits}f} {unit}"
     return f"{math.ceil(size / 1e3)} kB"
 
 
@@ -46,4 +49,4 @@ def time_text(seconds: float) -> str:
 def needed_text(needed: int, allowed: int | None) -> str:
     """Write what is needed of what may be used."""
     of_allowed = f" of {size_text(allowed)} allowed" if allowed is not None else ""
-    return f"about {size_text(needed)}{of_allowed}"
+    return f"about {size_text(needed, up=True)}{of_allowed}"
