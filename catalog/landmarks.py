@@ -1,4 +1,4 @@
-"""How far a run by landmarks went past all pairs, and what holds of the landmarks alone."""
+"""What a run that did not compare all pairs leaves open: by landmarks, and where far pairs were left out."""
 
 from __future__ import annotations
 
@@ -47,6 +47,20 @@ def approximation(catalog: Catalog) -> Approximation | None:
     if route_of(catalog) != "landmarks":
         return None
     return catalog.keep("approximation", lambda: _read(catalog))
+
+
+def route_note(catalog: Catalog) -> str | None:
+    """Say what the run compared and what that leaves open; None where it compared all pairs, or none."""
+    if not len(catalog.clips):
+        return None
+    if route_of(catalog) == "pruned":
+        kept, clips, mu = len(catalog.pairs), len(catalog.clips), catalog.config.clusters.threshold
+        return (
+            f"Pruned: {kept:,} of {clips * (clips - 1) // 2:,} pairs are at most {mu:g} apart; the others "
+            "are left out, and with them the other partitions"
+        )
+    found = approximation(catalog)
+    return None if found is None else str(found)
 
 
 def clustered_clips(catalog: Catalog) -> list[str]:

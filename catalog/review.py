@@ -21,12 +21,17 @@ The list is ordered by *urgency*, how likely a clip's name is wrong, from 0 to 1
     neighbours. 0: the name is not in doubt.
 
 A clip that a person has labelled is not asked about again, save where the same bytes have two such labels.
+
+Where the run did not compare all pairs, a and b are computed here. Clips that are almost the same motion are
+found among the pairs that there are: all of them where far pairs were left out, else those of landmarks.
 """
 
 from __future__ import annotations
 
 import pyarrow as pa
 
+from motionary.catalog.labelled_neighbours import labelled_neighbours
+from motionary.catalog.landmarks import approximation, route_of
 from motionary.catalog.query import Catalog
 from motionary.pipeline.tables import table_field
 
@@ -58,6 +63,8 @@ REASONS = {
 
 _SIDES = """select clip_a as clip_id, clip_b as other, {metric}::double as distance from pairs
     union all select clip_b, clip_a, {metric}::double from pairs"""
+_COMPUTED = "select unnest($neighbours, recursive := true)"
+_NONE = "select null::varchar as clip_id, null::varchar as other, null::double as distance where false"
 
 _USUAL = """
 select coalesce(median(nearest), 0) as distance
@@ -164,12 +171,24 @@ def review(catalog: Catalog, confidence: float = 0.8, near: float = 0.07) -> pa.
     """
     for table in ("labels", "inputs"):
         catalog.files(table)
-    settings = catalog.settings
-    metric = settings["clusters"]["metric"]
-    sides = _SIDES.format(metric=metric)
-    usual = catalog.sql(_USUAL.format(sides=sides))["distance"][0].as_py()
-    found = catalog.sql(
-        _QUERY.format(metric=metric, sides=sides),
-        {"confidence": confidence, "close": near * usual, "reasons": list(REASONS)},
+    metric = catalog.settings["clusters"]["metric"]
+    stored = _SIDES.format(metric=metric)
+    usual = catalog.sql(_USUAL.format(sides=stored))["distance"][0].as_py()
+    asked = {"confidence": confidence, "close": near * usual, "reasons": list(REASONS)}
+    sides = stored
+    if route_of(catalog) != "all":
+        neighbours = labelled_neighbours(catalog, metric)
+        sides = _COMPUTED if neighbours else _NONE
+        asked |= {"neighbours": neighbours} if neighbours else {}
+    return catalog.sql(_QUERY.format(metric=metric, sides=sides), asked).cast(REVIEW)
+
+
+def left_open(catalog: Catalog) -> str | None:
+    """Say of what the list knows less than of the rest; None where it knows all."""
+    found = approximation(catalog)
+    if found is None:
+        return None
+    return (
+        f"Contradictions and duplicates are looked for among the {len(found.landmarks):,} landmarks alone, "
+        "whose pairs the run compared"
     )
-    return found.cast(REVIEW)

@@ -263,8 +263,8 @@ class PipelineConfig:
             )
         if clusters.landmarks is not None and self.distances.pairs != "landmarks":
             raise ValueError(
-                f"there are {clusters.landmarks} landmarks, and pairs is {self.distances.pairs!r}; set it to "
-                "'landmarks', or leave them out"
+                f"clusters.landmarks is {clusters.landmarks}, and distances.pairs {self.distances.pairs!r}; "
+                "set that to 'landmarks', or leave the landmarks out"
             )
 
     @property

@@ -314,7 +314,7 @@ def test_more_clusters_than_landmarks_are_refused(library, tmp_path):
 
 
 def test_landmarks_are_counted_only_where_they_are_asked_for():
-    with pytest.raises(ValueError, match="set it to 'landmarks'"):
+    with pytest.raises(ValueError, match="set that to 'landmarks'"):
         PipelineConfig(clusters=ClusterConfig(landmarks=5))
     with pytest.raises(ValueError, match="landmarks is 0"):
         ClusterConfig(landmarks=0)

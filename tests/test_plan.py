@@ -17,16 +17,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
-from motionary.pipeline.layout import Clip, Layout
-from motionary.pipeline.readers.library import FileState, Source
 from motionary.pipeline.task import MAKES, OF_LANDMARKS
-from motionary.workflows.costs.amounts import Amounts, clip_sizes
+from motionary.workflows.costs.amounts import Amounts
 from motionary.workflows.costs.calibration import Calibration, Share, Tile, calibrate
 from motionary.workflows.costs.disk import needed_bytes, refuse_small_disks
 from motionary.workflows.costs.made_up import Squares
 from motionary.workflows.costs.memory import need_of, refuse
 from motionary.workflows.costs.model import foretold_by, with_seconds
-from motionary.workflows.costs.sample import sample_size, sampled
+from motionary.workflows.costs.sample import sample_size
 from motionary.workflows.costs.sizes import parse_size, size_text, time_text
 from motionary.workflows.errors import UserError
 from motionary.workflows.main_job import _processes, run
@@ -173,38 +171,9 @@ def test_a_disk_too_small_for_all_pairs_has_fewer_proposed(full, demo_library, t
     )
     with pytest.raises(UserError, match="or compare fewer pairs: --landmarks auto"):
         refuse_small_disks(ready.store, amounts(10_000), many, need)
+    refuse_small_disks(ready.store, amounts(10_000), replace(many, to_store=0), need)
     near = replace(amounts(10_000), pruned=True)
     refuse_small_disks(ready.store, near, many, need_of(near, 2, 64 * GIB))
-
-
-def library(sizes) -> Layout:
-    names = [f"{number:05d}.bvh" for number in range(len(sizes))]
-    sources = [
-        Source(name, name, "", (name,), name, "bvh", (FileState(name, size, 0, 0, 0),))
-        for name, size in zip(names, sizes, strict=True)
-    ]
-    return Layout([[[Clip(source, source.clip_id) for source in sources]]])
-
-
-@given(st.lists(st.integers(1, 10**6), min_size=1, max_size=500))
-def test_a_sample_is_of_different_clips_of_all_sizes(sizes):
-    layout = library(sizes)
-    drawn = [clip for clip in sampled(layout, clip_sizes(layout))]
-    assert len({clip.clip_id for clip in drawn}) == len(drawn) == sample_size(len(sizes))
-    ranks = sorted(sorted(sizes).index(clip.source.states[0].size) for clip in drawn)
-    stretch = len(sizes) / len(drawn)
-    # Equal sizes share the lowest rank of them.
-    assert all(rank <= (place + 1) * stretch for place, rank in enumerate(ranks))
-
-
-def test_what_lies_in_a_zip_has_its_share_of_it(tmp_path):
-    archive = tmp_path / "all.zip"
-    archive.write_bytes(b"x" * 1000)
-    names = [f"{archive}/{number}.bvh" for number in range(4)]
-    states = [(FileState(name, 1000, 0, 0, 0),) for name in names]
-    sources = [Source(n, n, "", (n,), n, "bvh", state) for n, state in zip(names, states, strict=True)]
-    sizes = clip_sizes(Layout([[[Clip(source, source.clip_id) for source in sources]]]))
-    assert set(sizes.values()) == {1000}  # four times a zip's bytes, among four
 
 
 MEASURED = Calibration(

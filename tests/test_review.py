@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
 from motionary.catalog import Catalog, CatalogError
+from motionary.catalog import review as review_module
 from motionary.catalog.review import REVIEW, review
 from motionary.catalog.snapshot import Snapshot
 from motionary.catalog.store import Store
@@ -22,6 +24,7 @@ from motionary.workflows.main_job import run
 from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
 from tests.catalogs import copied
+from tests.web.serving import with_mistakes
 
 
 @pytest.fixture
@@ -70,7 +73,7 @@ def line(tmp_path):
                 "cluster_id": [*first], "clip_id": [*first.values()], "label": pa.array(called, pa.string()),
                 "size": [cluster.count(one) for one in first],
             },
-            "runs": {"settings": [json.dumps({"clusters": {"metric": "dtw"}})]},
+            "runs": {"settings": [json.dumps({"clusters": {"metric": "dtw"}, "distances": {}})]},
         }  # fmt: skip
         files = {}
         for table, columns in tables.items():
@@ -213,6 +216,34 @@ def test_an_older_catalog_is_told_to_be_run_again(line):
     )
     with pytest.raises(CatalogError, match="older motionary published it"):
         review(Catalog(catalog.store, older))
+
+
+def test_distances_that_no_pair_holds_are_computed(
+    demo_library, demo_catalog, tmp_path, silent_progress, monkeypatch
+):
+    with Catalog.open(with_mistakes(demo_library, demo_catalog, tmp_path, silent_progress)) as catalog:
+        stored = review(catalog)
+        monkeypatch.setattr(review_module, "route_of", lambda catalog: "landmarks")
+        assert review(catalog).equals(stored)
+    assert stored["reason"].to_pylist().count("mislabelled") >= 6
+
+
+def test_by_landmarks_every_doubtful_name_is_listed(demo_library, tmp_path, silent_progress, motionary):
+    config = PipelineConfig(
+        clusters=ClusterConfig(n_clusters=4, landmarks=12), distances=DistanceConfig(pairs="landmarks")
+    )
+    job = Job([str(demo_library)], str(tmp_path / "catalog"), config, demo_library / "labels.csv")
+    run(job, silent_progress)
+    with Catalog.open(tmp_path / "catalog") as catalog:
+        doubtful = catalog.sql(
+            """select c.clip_id from clusters c join "references" r using (cluster_id)
+            where c.label <> r.label order by 1"""
+        )
+        listed = review(catalog)
+    mislabelled = listed.filter(pc.equal(listed["reason"], "mislabelled"))
+    assert sorted(mislabelled["clip_id"].to_pylist()) == doubtful["clip_id"].to_pylist()
+    assert len(mislabelled) > 12
+    assert "among the 12 landmarks alone" in motionary("label", "review", tmp_path / "catalog")[2]
 
 
 def test_planted_mistakes_come_first(demo_catalog, tmp_path):

@@ -21,6 +21,7 @@ from typing import Any, Literal, NoReturn
 
 from motionary.catalog import Catalog, CatalogError
 from motionary.catalog.history import diff
+from motionary.catalog.landmarks import route_note
 from motionary.catalog.snapshot import current_snapshot
 from motionary.catalog.store import Store
 from motionary.catalog.vacuum import vacuum
@@ -165,6 +166,8 @@ def _published(result: RunResult, log: RunLog, report: RunReport) -> None:
         log("labels_stale", count=len(result.stale_labels), renamed=dict(result.stale_labels))
     if result.labels_outside:
         log("labels_outside", count=len(result.labels_outside), first=result.labels_outside[0])
+    if note := route_note(result.catalog):
+        log("remark", text=note)
     log(
         "published", snapshot=report.snapshot_after, run_id=report.run_id, clips=len(result.catalog.clips),
         quarantined=len(report.quarantined), clusters=len(report.clusters),

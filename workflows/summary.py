@@ -8,7 +8,7 @@ from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 
 from motionary.catalog import Catalog
-from motionary.catalog.landmarks import approximation, route_of
+from motionary.catalog.landmarks import route_note, route_of
 from motionary.catalog.snapshot import OVERVIEW
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.views.linkages import linkages_by_distance
@@ -23,15 +23,14 @@ def print_summary(catalog: Catalog, console: Console) -> None:
     run = catalog.last_run
     clips, clusters = counted(run["clips"], "clip"), counted(run["clusters"], "cluster")
     console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
-    found = approximation(catalog)
-    if found is not None:
-        exact = "motionary reproduce landmarks, on a catalog of all pairs of a smaller library"
-        console.print(f"{found} How far they may be from exact: {exact}")
-    if route_of(catalog) == "pruned":
-        kept, pairs = len(catalog.pairs), run["clips"] * (run["clips"] - 1) // 2
-        mu = catalog.config.clusters.threshold
-        near = f"{kept:,} of {pairs:,} pairs are at most {mu:g} apart"
-        console.print(f"Pruned: {near}; the others are left out, and with them the other partitions")
+    note = route_note(catalog)
+    if note and route_of(catalog) == "landmarks":
+        note += (
+            " How far they may be from exact: motionary reproduce landmarks, on a catalog of all pairs of a "
+            "smaller library"
+        )
+    if note:
+        console.print(note)
     parts: list[RenderableType] = []
     if run["quarantined"]:
         parts += ["", quarantine_table(catalog)]

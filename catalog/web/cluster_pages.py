@@ -5,7 +5,9 @@ from __future__ import annotations
 from starlette.requests import Request
 from starlette.responses import Response
 
+from motionary.catalog.own_pairs import all_pairs_are_there
 from motionary.catalog.query import Catalog
+from motionary.catalog.views.sections import why_no_chart
 from motionary.catalog.web.chart_data import MAP, wanted_cluster
 from motionary.catalog.web.pages import clusters_of, page_number
 from motionary.catalog.web.render import link, render, shown_to
@@ -49,7 +51,10 @@ def cluster_map(request: Request) -> Response:
     shown = shown_to(request)
     clips = len(shown.catalog.clips)
     waits = clips > _MANY and not shown.ready("places", MAP)
-    return render(request, "map.html", clips=clips, waits=waits)
+    why_none = "There is no clip to draw." if not clips else None
+    if clips and not all_pairs_are_there(shown.catalog):
+        why_none = why_no_chart(shown.catalog, "A map")
+    return render(request, "map.html", clips=clips, waits=waits, why_none=why_none)
 
 
 def _members(catalog: Catalog, cluster_id: int) -> dict[str, float]:

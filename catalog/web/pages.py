@@ -10,6 +10,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from motionary.catalog.errors import CatalogError
+from motionary.catalog.landmarks import route_note
 from motionary.catalog.query import Catalog
 from motionary.catalog.views.cluster_table import cluster_table
 from motionary.catalog.web.opened import Shown
@@ -29,6 +30,7 @@ def start(request: Request) -> Response:
         about=shown.keep("answer", "description", shown.catalog.describe),
         clusters=clusters[:_FIRST],
         many=len(clusters),
+        note=shown.keep("answer", "route", lambda: route_note(shown.catalog)),
         quarantined=shown.keep("answer", "quarantine", lambda: _quarantined(shown.catalog)),
     )
 
@@ -62,9 +64,13 @@ def search(request: Request) -> Response:
 
 def clusters(request: Request) -> Response:
     """Answer /clusters: all of them, the largest first."""
-    found = page_of(clusters_of(shown_to(request)), page_number(request))
+    shown = shown_to(request)
     return render(
-        request, "clusters.html", found=found, page_link=lambda number: link("/clusters", page=number)
+        request,
+        "clusters.html",
+        found=page_of(clusters_of(shown), page_number(request)),
+        note=shown.keep("answer", "route", lambda: route_note(shown.catalog)),
+        page_link=lambda number: link("/clusters", page=number),
     )
 
 

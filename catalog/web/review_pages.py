@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from motionary.catalog.review import REASONS
+from motionary.catalog.review import REASONS, left_open
 from motionary.catalog.web.opened import Shown
 from motionary.catalog.web.render import link, render, shown_to
 
@@ -43,6 +43,7 @@ def review_page(request: Request) -> Response:
         known=shown.keep("answer", "known labels", lambda: _known(shown)),
         last=state.desk and state.desk.last,
         outdated=listed is not None and listed.snapshot != shown.catalog.snapshot.snapshot_id,
+        less=shown.keep("answer", "left open", lambda: left_open(shown.catalog)),
         total=len(there),
         decided=sum(names[one]["decided"] for one in there),
         **_neighbours(there, names, clip_id),

@@ -82,7 +82,7 @@ _EVERY = (
     Aligner(
         "generalized-time-warping", "GTW", "[GTW] 4", "features", generalized_pair, other_dofs=True
     ),
-    Aligner("cotw", "CoTW", "[CoTW] 3, 4", "features", cotw_search),
+    Aligner("cotw", "CoTW", "[CoTW] 3, 4", "features", partial(cotw_search, effort="fast")),
     Aligner("adaptive-dtw", "adaptive DTW", "[ADTW]", "postures", adaptive_dtw),
     *(
         Aligner(

@@ -18,6 +18,9 @@ from motionary.catalog.web import static_files
 from motionary.catalog.web.opened import CatalogGone, Opened
 from motionary.catalog.web.search import PAGE, page_of
 from motionary.pipeline.canonical import CANONICAL_JOINTS
+from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineConfig
+from motionary.workflows.main_job import run
+from motionary.workflows.preparation import Job
 from motionary.workflows.relabel import relabel
 from tests.catalogs import copied
 from tests.web.hostile import LABELS, NAMES, hostile_catalog
@@ -46,6 +49,15 @@ def hostile(demo_library, tmp_path_factory, silent_progress):
         yield client
 
 
+@pytest.fixture(scope="module")
+def by_landmarks(demo_library, tmp_path_factory, silent_progress):
+    config = PipelineConfig(clusters=ClusterConfig(landmarks=12), distances=DistanceConfig(pairs="landmarks"))
+    url = str(tmp_path_factory.mktemp("landmarks") / "catalog")
+    run(Job([str(demo_library)], url, config, demo_library / "labels.csv"), silent_progress)
+    with served(url) as client:
+        yield client
+
+
 class Read(HTMLParser):
     """Which elements a page has, their attributes, and its text."""
 
@@ -69,6 +81,26 @@ def read(client, path: str, status: int = 200, **query) -> Read:
     answer = client.get(path, params=query or None)
     assert answer.status_code == status, answer.text
     return Read(answer.text)
+
+
+@pytest.mark.parametrize("path", ["/", "/clusters"])
+def test_clusters_by_landmarks_are_told_to_be_approximate(by_landmarks, client, path):
+    assert "Approximate: clusters from 12 landmarks of 80 clips" in read(by_landmarks, path).text
+    assert "Approximate" not in read(client, path).text
+
+
+def test_without_all_pairs_the_map_says_why_there_is_none(by_landmarks, client):
+    page = read(by_landmarks, "/map")
+    assert "A map needs all pairs: this run compared those of its landmarks" in page.text
+    assert "lie together" not in page.text
+    assert not any("name=map" in url for url in page.values("data-chart"))
+    assert any("name=map" in url for url in read(client, "/map").values("data-chart"))
+
+
+def test_the_review_says_what_landmarks_leave_open(by_landmarks, client):
+    told = "looked for among the 12 landmarks alone"
+    assert told in read(by_landmarks, "/review").text
+    assert told not in read(client, "/review").text
 
 
 def clips_on(page: Read) -> list[str]:

@@ -105,15 +105,18 @@ def review(
 
     As CSV it can be edited and imported again: column label is for what you decide.
     """
+    from motionary.catalog.review import left_open
     from motionary.catalog.review import review as listed
     from motionary.workflows.tables import write_table
 
     with open_catalog(catalog) as opened:
-        found = listed(opened)
+        found, less = listed(opened), left_open(opened)
     shown = found.slice(0, most)
     write_table(shown.drop_columns("label") if format_ == "table" else shown, format_)
     if len(found) > most:
         _say(f"{most} of {len(found)} clips; -n {len(found)} lists them all")
+    if less:
+        _say(less)
 
 
 def _meant(clip: str, known: Sequence[str], where: str) -> list[str]:

@@ -62,7 +62,8 @@ def similar(
 ) -> None:
     """Find the clips of CATALOG that are most like a clip or a file.
 
-    A clip's distances are stored; a file is compared with all clips, exactly.
+    A clip's distances are read where the run stored all pairs; else a clip, as a file, is compared with all,
+    exactly. --rank mutual needs all pairs.
     """
     if within and (metric is not None or rank != "distance"):
         raise typer.BadParameter("--within has a distance of its own; give it without --metric and --rank")

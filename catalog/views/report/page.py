@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from motionary.catalog.own_pairs import all_pairs_are_there
 from motionary.catalog.query import Catalog
+from motionary.catalog.review import left_open
 from motionary.catalog.views.assets import asset
 from motionary.catalog.views.cluster_map import cluster_map_figure
 from motionary.catalog.views.dendrogram import dendrogram_figure
@@ -85,7 +86,7 @@ def report_page(catalog: Catalog, since: Since | None = None) -> str:
     body = [
         changes_section(catalog, since),
         cards_section(cards, footage),
-        review_section(queue, footage),
+        review_section(queue, footage, left_open(catalog)),
         quarantine_section(catalog, _MOST_QUARANTINED),
         _map_section(catalog, charts["map"]),
         _labels_section(charts["labels"]),

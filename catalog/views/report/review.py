@@ -39,8 +39,8 @@ def reviewed_clips(queue: list[Row] | str) -> Iterator[str]:
         yield from reversed(_played(row))
 
 
-def review_section(queue: list[Row] | str, footage: Footage) -> str:
-    """Show the queue."""
+def review_section(queue: list[Row] | str, footage: Footage, less: str | None) -> str:
+    """Show the queue; `less` says of what it knows less."""
     if isinstance(queue, str):
         return section(_TITLE, queue, name=_NAME)
     if not queue:
@@ -63,6 +63,7 @@ def review_section(queue: list[Row] | str, footage: Footage) -> str:
         f"Clips whose names may be wrong, {len(queue):,} in all, the likeliest first{more}. "
         "Press a picture to see the clip beside the one that speaks against its name. "
         "motionary label set CATALOG CLIP LABEL names a clip, and label review lists them all. "
+        + (f"{less}. " if less else "")
         + footage.no_room(_played(row) for row in queue[:MOST_SEEN]),
         f'<div class="stage" id="{_STAGE}"></div>',
         details("What the reasons mean", table(["reason", "the clip is listed because"], [*REASONS.items()])),
