@@ -1,6 +1,7 @@
 """The graph: what depends on what, what keys cover, and how it grows."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +17,7 @@ from motionary.pipeline.config import (
 )
 from motionary.pipeline.graph import LibraryGraph
 from motionary.pipeline.layout import Earlier, cut_by_name, lay_out, side_for
-from motionary.pipeline.readers.library import Source
+from motionary.pipeline.readers.library import FORMATS, Source
 from motionary.pipeline.stage_settings import reading_settings
 from motionary.pipeline.tables import TABLES
 from motionary.pipeline.task import Task
@@ -59,6 +60,28 @@ def keys(sources, config=None, **given) -> dict[str, set[str]]:
 
 def changed(first, second) -> set[str]:
     return {stage for stage in first if first[stage] != second[stage]}
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("x_120.bvh", "y_240.bvh", True),
+        ("x.bvh", "x.c3d", False),
+        ("x_120.amc x.asf", "y_120.amc y.asf", True),
+        ("x_120.amc x.asf", "x_240.amc x.asf", False),  # the name says the rate
+        ("x.amc x.asf", "x_120.amc x.asf", False),
+        ("x.amc", "y.amc", False),  # which skeleton is missing depends on the name
+        ("gone.bvh", "gone-too.bvh", False),
+    ],
+)
+def test_equal_bytes_are_read_once_where_the_name_says_nothing(one, other, same):
+    def key(files: str) -> str:
+        name, *_ = names = files.split()
+        digest = "" if "gone" in name else "digest"
+        source = Source(name, name, "", tuple(names), digest, FORMATS[Path(name).suffix])
+        return lay_out([source], ["reading"], 32, Earlier()).keys[name]
+
+    assert (key(one) == key(other)) == same
 
 
 def test_tasks_follow_what_they_read():

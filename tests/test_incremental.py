@@ -17,6 +17,7 @@ from motionary.pipeline.config import (
     DistanceConfig,
     FeatureConfig,
     PipelineConfig,
+    ReadConfig,
 )
 from motionary.pipeline.readers import library as scanning
 from motionary.pipeline.stages import align, compare, ingest, represent
@@ -177,6 +178,17 @@ def test_settings_and_back_again_find_the_first_results(after_first, work):
     work.clear()
     after_first()
     assert (work["read"], work["compared"]) == (0, 0)
+
+
+@pytest.mark.parametrize("other", [{"read": ReadConfig(up="z")}, {"features": FeatureConfig(frame_rate=15)}])
+def test_other_reading_settings_read_everything_anew(
+    takes, after_first, tmp_path, silent_progress, work, other
+):
+    grown = after_first(**other).catalog
+    assert work["read"] == 10
+    fresh = run(job(takes, tmp_path / "fresh", **other), silent_progress).catalog
+    one, another = (catalog.sql("select * from features order by all") for catalog in (grown, fresh))
+    assert one.equals(another)
 
 
 def test_another_size_of_batches_moves_results_about(after_first, work):
@@ -364,6 +376,19 @@ def test_a_name_decides_nothing_between_equally_good_references(takes, tmp_path,
     fresh = run(job(takes, tmp_path / "fresh", clusters=one), silent_progress).catalog
     assert grown.references.to_arrow().equals(fresh.references.to_arrow())
     assert grown.references.to_arrow()["clip_id"].to_pylist() == ["zz.bvh"]
+
+
+def test_a_copy_inside_a_cluster_counts_there(takes, after_first, tmp_path, silent_progress):
+    shutil.copy(sorted((takes / "squat").iterdir())[0], takes / "squat" / "copy.bvh")
+    grown = after_first().catalog
+    assert [check.name for check in verify(grown.store) if not check.passed] == []
+    fresh = run(job(takes, tmp_path / "fresh"), silent_progress).catalog
+    for table in ("references", "styles"):
+        one, other = (
+            catalog.sql(f'select * exclude (cluster_id) from "{table}" order by clip_id')
+            for catalog in (grown, fresh)
+        )
+        assert one.equals(other), table
 
 
 def test_lost_numbers_are_not_given_again(after_first, tmp_path):

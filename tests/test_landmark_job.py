@@ -20,6 +20,7 @@ from motionary.pipeline.config import ClusterConfig, DistanceConfig, PipelineCon
 from motionary.pipeline.distances import pairwise_distances
 from motionary.pipeline.stages.clip_frames import Measure, channels_of
 from motionary.pipeline.stages.columns import matrix, per_clip
+from motionary.pipeline.stages.compare import thresholds_of
 from motionary.pipeline.task import MAKES, run_task
 from motionary.workflows.errors import UserError
 from motionary.workflows.main_job import run
@@ -32,8 +33,10 @@ SAME = {
 }  # fmt: skip
 
 
-def config_of(landmarks: int | None = 15, tile: int = 8, **clusters: object) -> PipelineConfig:
-    distances = DistanceConfig(pairs="landmarks", tile=tile)
+def config_of(
+    landmarks: int | None = 15, tile: int = 8, thresholds: str = "midpoints", **clusters: object
+) -> PipelineConfig:
+    distances = DistanceConfig(pairs="landmarks", tile=tile, thresholds=thresholds)
     return PipelineConfig(clusters=ClusterConfig(landmarks=landmarks, **clusters), distances=distances)
 
 
@@ -82,7 +85,8 @@ def reference(graph, store: Store, labels: list | None) -> list[int]:
         for clip_id, part in per_clip(store.load(task.key, "resampled")).items()
     }
     clip_ids = sorted(frames)
-    found = pairwise_distances([frames[one] for one in clip_ids], n_jobs=1)
+    thresholds = thresholds_of(graph.config.distances)
+    found = pairwise_distances([frames[one] for one in clip_ids], n_jobs=1, thresholds=thresholds)
     clusters = graph.config.clusters
     square = np.stack([squareform(getattr(found, name)) for name in channels_of(clusters)])
     keys = [graph.contents[one] for one in clip_ids]
@@ -104,6 +108,8 @@ def reference(graph, store: Store, labels: list | None) -> list[int]:
         (12, {"metric": "dtw", "primary": "average", "threshold": 0.2}, False),
         (12, {"n_clusters": 5}, False),
         (1, {}, False),
+        (12, {"thresholds": "random", "threshold": 0.4}, False),
+        (12, {"thresholds": "random", "primary": "fuzzy", "n_clusters": 12}, False),
     ],
 )
 def test_groups_are_those_of_the_pure_functions(library, stored, landmarks, clusters, labelled, tile):
@@ -119,6 +125,13 @@ def test_groups_are_those_of_the_pure_functions(library, stored, landmarks, clus
 def test_another_threshold_refines_anew(library, stored):
     for threshold in (0.4, 0.3, 0.4):
         job = Job(library, stored, config_of(6, threshold=threshold))
+        graph, groups = grouped(job)
+        assert groups["group"].to_pylist() == reference(graph, Store(stored), None)
+
+
+def test_more_landmarks_refine_anew(library, stored):
+    for landmarks in (2, 3, 4):
+        job = Job(library, stored, config_of(landmarks, primary="complete", threshold=0.2))
         graph, groups = grouped(job)
         assert groups["group"].to_pylist() == reference(graph, Store(stored), None)
 
@@ -218,6 +231,21 @@ def test_another_clip_leaves_the_other_batches_assigned(demo_library, tmp_path):
     assert len(groups) == 11
     assert stages.count("ingest") == stages.count("assign") == 1 < len(after.ingested)
     assert not {"sample", "compare"} & {*stages}
+
+
+def test_a_landmark_that_changes_is_compared_anew(demo_library, tmp_path):
+    folder = tmp_path / "library"
+    shutil.copytree(demo_library / "walk", folder)
+    job = Job([str(folder)], str(tmp_path / "out"), config_of(9, tile=4, threshold=0.3))
+    before, _ = grouped(job)
+    landmarks = [one.clip_id for one in before.landmarks]
+    for file in sorted((demo_library / "squat").iterdir()):
+        shutil.copy(file, folder / landmarks[0])
+        if [one.clip_id for one in prepare(job).graph.landmarks] == landmarks:
+            break
+    after, groups = grouped(job)
+    assert [one.clip_id for one in after.landmarks] == landmarks
+    assert groups["group"].to_pylist() == reference(after, Store(job.catalog), None)
 
 
 def test_a_catalog_goes_from_one_route_to_another(library, tmp_path, silent_progress):

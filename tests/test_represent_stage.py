@@ -7,11 +7,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
+from scipy.spatial.distance import squareform
 
 from motionary.catalog import Catalog
 from motionary.pipeline.alignment import joint_weights, score_references
 from motionary.pipeline.config import AlignmentConfig, ClusterConfig, DistanceConfig
+from motionary.pipeline.distances import pairwise_distances
 from motionary.pipeline.parts import Parts
+from motionary.pipeline.stages.columns import matrix, per_clip
+from motionary.pipeline.stages.compare import thresholds_of
 from motionary.pipeline.stages.represent import represent
 from motionary.pipeline.stages.represent_landmarks import represent_landmarks
 from motionary.pipeline.tables import TABLES
@@ -200,15 +204,30 @@ def test_where_a_clip_stands_still_the_medoid_is_chosen(library):
     assert again == tables
 
 
+def drawn(library, distances):
+    """The pairs, their weighted distances by thresholds that are drawn."""
+    frames = [matrix(part["feature"]) for part in per_clip(library["resampled"]).values()]
+    ids = [*per_clip(library["resampled"])]
+    found = squareform(pairwise_distances(frames, n_jobs=1, thresholds=thresholds_of(distances)).weighted)
+    pairs = library["pairs"]
+    a, b = (np.array([ids.index(one) for one in pairs[name].to_pylist()]) for name in ("clip_a", "clip_b"))
+    place = pairs.column_names.index("weighted")
+    field = pairs.schema.field(place)
+    return pairs.set_column(place, field, pa.array(found[a, b].astype(np.float32), field.type))
+
+
+@pytest.mark.parametrize("thresholds", ["midpoints", "random"])
 @pytest.mark.parametrize("metric", ["weighted", "dtw"])
-def test_distances_that_are_computed_there_choose_the_same(library, metric):
+def test_distances_that_are_computed_there_choose_the_same(library, metric, thresholds):
     features = stilled(library, clips_of(library)[5][0])  # whose cluster gets a medoid
-    wanted = made(library, features=Parts.of(features), metric=metric)
+    distances = DistanceConfig(thresholds=thresholds)
+    pairs = drawn(library, distances) if thresholds == "random" else library["pairs"]
+    wanted = made(library, Parts.of(pairs), Parts.of(features), metric=metric)
     empty = [TABLES[name].empty_table() for name in ("centres", "reference_features")]
     resampled = divided(library["resampled"], np.random.default_rng(0))
     found = represent_landmarks(
         library["members"], library["ingested"], *empty, resampled, Parts.of(features), {},
-        DistanceConfig(), ClusterConfig(metric=metric), AlignmentConfig(), 0,
+        distances, ClusterConfig(metric=metric), AlignmentConfig(), 0,
     )  # fmt: skip
     assert {name: table.combine_chunks() for name, table in found.items()} == wanted
 
