@@ -242,12 +242,6 @@ def test_a_rendered_notebook_wants_neither_kernel_nor_network():
     assert said.text == "said"
 
 
-@pytest.mark.slow
-def test_the_site_is_built_without_a_warning(tmp_path):
-    build_site(ROOT, tmp_path / "site")
-    assert (tmp_path / "site" / "README.html").is_file()
-
-
 def test_every_readme_has_its_place_on_the_site():
     entries = re.findall(r"^(?:.*<)?([\w/]*README)>?$", PAGES["index.md"], re.M)
     assert sorted(f"{one}.md" for one in entries) == sorted(readmes(ROOT))
