@@ -13,6 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from motionary.catalog.landmarks import route_in
 from motionary.catalog.query import Catalog
 
 _TEXT, _ID = pa.string(), pa.int32()
@@ -146,13 +147,9 @@ def run_history(catalog: Catalog) -> pa.Table:
     snapshots = [run_id.rpartition("-")[2] for run_id in table["run_id"].to_pylist()]
     there = set(catalog.snapshots())
     kept = [snapshot in there for snapshot in snapshots]
-    routes = [_route(settings) for settings in runs["settings"].to_pylist()]
+    routes = [route_in(json.loads(settings)) for settings in runs["settings"].to_pylist()]
     table = table.append_column("pairs", pa.array(routes, _TEXT))
     return table.add_column(1, "snapshot", [snapshots]).add_column(2, "kept", [kept])
-
-
-def _route(settings: str) -> str:
-    return json.loads(settings)["distances"].get("pairs", "all")  # runs of before there were others
 
 
 def _renamed(went: Mapping[str, str], came: Mapping[str, str]) -> dict[str, str]:

@@ -12,10 +12,11 @@ from motionary.catalog.query import Catalog
 from motionary.catalog.ranked_distance import ranked_distance
 from motionary.pipeline.config import Metric
 
-_DOUBTFUL = """
+DOUBTFUL = """
 select c.clip_id, c.label, r.label as name from clusters c join "references" r using (cluster_id)
-where c.label_source = 'supplied' and c.label <> r.label order by c.clip_id
+where c.label_source = 'supplied' and c.label <> r.label
 """
+"""Clips whose supplied label is not the name of their cluster."""
 
 
 def labelled_neighbours(catalog: Catalog, metric: Metric) -> list[dict[str, Any]]:
@@ -26,7 +27,7 @@ def labelled_neighbours(catalog: Catalog, metric: Metric) -> list[dict[str, Any]
     list of dict
         clip_id, other, distance; up to two for every clip whose supplied label is not its cluster's name.
     """
-    doubtful = catalog.sql(_DOUBTFUL).to_pylist()
+    doubtful = catalog.sql(f"{DOUBTFUL} order by c.clip_id").to_pylist()
     if not doubtful:
         return []
     from motionary.pipeline.distances.nearest import nearest_clips

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pyarrow.compute as pc
 
@@ -73,7 +74,12 @@ def clustered_clips(catalog: Catalog) -> list[str]:
 
 def route_of(catalog: Catalog) -> str:
     """Say which pairs the run compared: "all", "pruned" or "landmarks"."""
-    return catalog.settings["distances"].get("pairs", "all")  # an older motionary had no choice
+    return route_in(catalog.settings)
+
+
+def route_in(settings: Mapping[str, Any]) -> str:
+    """Say the same of a run's settings."""
+    return settings["distances"].get("pairs", "all")  # an older motionary had no choice
 
 
 def _read(catalog: Catalog) -> Approximation:

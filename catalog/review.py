@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from motionary.catalog.labelled_neighbours import labelled_neighbours
+from motionary.catalog.labelled_neighbours import DOUBTFUL, labelled_neighbours
 from motionary.catalog.landmarks import approximation, route_of
 from motionary.catalog.query import Catalog
 from motionary.pipeline.tables import table_field
@@ -86,9 +86,7 @@ with own as (
     from alike t left join own a using (clip_id) left join own b on b.clip_id = t.other
     left join clips ca on ca.clip_id = t.clip_id left join clips cb on cb.clip_id = t.other
 ), doubtful as (
-    select own.clip_id, own.label, r.label as name
-    from own join clusters c using (clip_id) join "references" r on r.cluster_id = c.cluster_id
-    where not own.said and own.label <> r.label
+    {doubtful}
 ), sides as not materialized (
     {sides}
 ), weighed as (
@@ -180,7 +178,7 @@ def review(catalog: Catalog, confidence: float = 0.8, near: float = 0.07) -> pa.
         neighbours = labelled_neighbours(catalog, metric)
         sides = _COMPUTED if neighbours else _NONE
         asked |= {"neighbours": neighbours} if neighbours else {}
-    return catalog.sql(_QUERY.format(metric=metric, sides=sides), asked).cast(REVIEW)
+    return catalog.sql(_QUERY.format(metric=metric, doubtful=DOUBTFUL, sides=sides), asked).cast(REVIEW)
 
 
 def left_open(catalog: Catalog) -> str | None:

@@ -18,19 +18,19 @@ from motionary.workflows.tables import text_table
 _MOST_CLUSTERS = 40
 
 
+_HOW_FAR = (
+    " How far they may be from exact: motionary reproduce landmarks, on a catalog of all pairs of a smaller "
+    "library"
+)
+
+
 def print_summary(catalog: Catalog, console: Console) -> None:
     """Print a catalog's clips, clusters, scores, times and place."""
     run = catalog.last_run
     clips, clusters = counted(run["clips"], "clip"), counted(run["clusters"], "cluster")
     console.print(f"{clips}, {run['quarantined']} quarantined, {clusters}")
-    note = route_note(catalog)
-    if note and route_of(catalog) == "landmarks":
-        note += (
-            " How far they may be from exact: motionary reproduce landmarks, on a catalog of all pairs of a "
-            "smaller library"
-        )
-    if note:
-        console.print(note)
+    if note := route_note(catalog):
+        console.print(f"{note}{_HOW_FAR}" if route_of(catalog) == "landmarks" else note)
     parts: list[RenderableType] = []
     if run["quarantined"]:
         parts += ["", quarantine_table(catalog)]

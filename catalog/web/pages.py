@@ -30,7 +30,7 @@ def start(request: Request) -> Response:
         about=shown.keep("answer", "description", shown.catalog.describe),
         clusters=clusters[:_FIRST],
         many=len(clusters),
-        note=shown.keep("answer", "route", lambda: route_note(shown.catalog)),
+        note=_note(shown),
         quarantined=shown.keep("answer", "quarantine", lambda: _quarantined(shown.catalog)),
     )
 
@@ -69,7 +69,7 @@ def clusters(request: Request) -> Response:
         request,
         "clusters.html",
         found=page_of(clusters_of(shown), page_number(request)),
-        note=shown.keep("answer", "route", lambda: route_note(shown.catalog)),
+        note=_note(shown),
         page_link=lambda number: link("/clusters", page=number),
     )
 
@@ -77,6 +77,10 @@ def clusters(request: Request) -> Response:
 def clusters_of(shown: Shown) -> list[dict[str, Any]]:
     """Return the published clusters, the largest first: see `motionary.catalog.views.cluster_table`."""
     return shown.keep("answer", "clusters", lambda: cluster_table(shown.catalog).to_pylist())
+
+
+def _note(shown: Shown) -> str | None:
+    return shown.keep("answer", "route", lambda: route_note(shown.catalog))
 
 
 def page_number(request: Request) -> int:

@@ -152,8 +152,7 @@ def _memory_limit() -> int:
 def _tasks(amounts: Amounts, room: int) -> dict[str, float]:
     """Say what the largest task of each stage holds, in bytes."""
     read, clips = _READ * amounts.batch, amounts.clips
-    poses, averages = _POSED * amounts.library, _AVERAGED * clips
-    undivided = _LARGEST_CLUSTER * poses, _LARGEST_CLUSTER * (averages + _ANALYSED * clips)
+    poses, undivided = _POSED * amounts.library, _LARGEST_CLUSTER * clips
     seen = 0 if amounts.pruned else _SEEN * amounts.clustered**2
     held = {
         "ingest": read + _PARSED * amounts.file,
@@ -161,10 +160,11 @@ def _tasks(amounts: Amounts, room: int) -> dict[str, float]:
         "compare": _COMPARED * amounts.tile,
         "cluster": _CLUSTERED * amounts.clustered + _NAMED * (clips - amounts.clustered) + seen,
         "identify": _NAMED * clips,
-        "represent": _NAMED * clips + min(poses, max(room, undivided[0])),
+        "represent": _NAMED * clips + min(poses, max(room, _LARGEST_CLUSTER * poses)),
         "name": _NAMED * clips,
         "align": read + _NAMED * clips,
-        "style": _STYLED * clips + max(min(averages, room), undivided[1]),
+        # Of one cluster that is more than the averages of all clusters together.
+        "style": _STYLED * clips + (_AVERAGED + _ANALYSED) * undivided,
         "publish": _PAGE,
     }
     if amounts.landmarks is not None:
